@@ -112,7 +112,7 @@ def generated() -> Iterator[Row]:
         return
     for name, half in ROBOTS.items():
         robot = load(name)
-        motors = [joint.name for joint in robot.joints.values() if joint.actuated]
+        motors = [joint.name for joint in robot.joints.values() if joint.is_actuated]
         box = dict.fromkeys(motors, (-half, half))
         rows = np.random.default_rng(0).uniform(-half, half, (POSES, len(motors)))
         given = "\n".join(" ".join(map(repr, map(float, row))) for row in rows)

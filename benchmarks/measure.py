@@ -16,7 +16,7 @@ from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.batch import program
 from hrsynth.batch.engine import Batch
 from hrsynth.description import load
-from hrsynth.geometry.so3 import exponential
+from hrsynth.geometry.so3 import convert_vectors_to_rotations
 from hrsynth.geometry.vectors import Array
 
 SIDE, TURNS = 201, 5
@@ -33,7 +33,7 @@ def spent() -> float:
 @contextmanager
 def threads(count: int) -> Iterator[None]:
     """numba's sweeps on so many threads."""
-    with mock.patch.object(program, "threads", return_value=count):
+    with mock.patch.object(program, "count_threads", return_value=count):
         yield
 
 
@@ -70,7 +70,7 @@ def plane(batch: Batch, size: float, phi: float = 0.0, side: int = SIDE) -> Arra
     X = np.tile(batch.home, (side * side, 1, 1))
     X[:, 0, 3] += np.repeat(steps, side)
     X[:, 1, 3] += np.tile(steps, side)
-    X[:, :3, :3] = exponential(np.array([0.0, 0.0, phi])) @ X[:, :3, :3]
+    X[:, :3, :3] = convert_vectors_to_rotations(np.array([0.0, 0.0, phi])) @ X[:, :3, :3]
     return X
 
 

@@ -19,24 +19,24 @@ from measure import Row, alone, least, spent
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
 from hrsynth.analysis.derive import derive
-from hrsynth.analysis.exact import architecture
+from hrsynth.analysis.exact import get_architecture
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.catalog import load as load_catalog
 from hrsynth.catalog import store
 from hrsynth.catalog.architecture_key import parse
-from hrsynth.catalog.build import without_motors
-from hrsynth.catalog.entry import entry
-from hrsynth.catalog.geometry import mechanism
+from hrsynth.catalog.build import remove_motors
+from hrsynth.catalog.entry import build_entry
+from hrsynth.catalog.geometry import build_mechanism
 from hrsynth.catalog.groups import GROUPS
 from hrsynth.catalog.query import count
 from hrsynth.description import list_robots, load
 from hrsynth.description.formats.mjcf.write import write
 from hrsynth.errors import HrsynthError
-from hrsynth.geometry.ranks import kernel_basis, largest_angle, range_basis
+from hrsynth.geometry.ranks import compute_kernel_basis, compute_largest_angle, compute_range_basis
 from hrsynth.geometry.vectors import Array
-from hrsynth.kinematics.locked_twists import rezero
+from hrsynth.kinematics.locked_twists import set_zero
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
-from hrsynth.present.text.catalog import entries
+from hrsynth.present.text.catalog import format_entries
 
 SYSTEMS, PLATFORMS, EXTERNAL = 12, 20, 3
 """Instances of each family of assembly modes, of platforms with 40 poses, and how many of them msolve is given."""
@@ -122,7 +122,7 @@ def jacobians() -> Iterator[Row]:
     except ImportError:
         return
     for robot in ("quattro", "gough_stewart", "delta"):
-        here = rezero(ObservedRobot.of(load(robot), samples=3).configurations[0])
+        here = set_zero(ObservedRobot.of(load(robot), samples=3).configurations[0])
         robot_model = PinocchioModel(here)
         model = mujoco.MjModel.from_xml_string(write(here).texts[0])
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT
@@ -142,11 +142,12 @@ def jacobians() -> Iterator[Row]:
         J = theirs(model.qpos0)
         mujoco.mj_jacBody(model, data, V[:3], V[3:], model.body(here.platform).id)
         own = (
-            robot_model.velocity(robot_model.q0, here.platform) @ kernel_basis(robot_model.jacobian(robot_model.q0))[0]
+            robot_model.velocity(robot_model.q0, here.platform)
+            @ compute_kernel_basis(robot_model.jacobian(robot_model.q0))[0]
         )
-        other = V @ kernel_basis(J)[0]
+        other = V @ compute_kernel_basis(J)[0]
         own[:3] *= robot_model.length
-        angle = largest_angle(range_basis(own, 1.0)[0], range_basis(other, 1.0)[0])
+        angle = compute_largest_angle(compute_range_basis(own, 1.0)[0], compute_range_basis(other, 1.0)[0])
         if not angle < 1e-5:
             raise SystemExit(f"{robot}: the platform's twists differ by {angle:.2g} rad")
         rng = np.random.default_rng(0)
@@ -201,7 +202,7 @@ def catalog() -> Iterator[Row]:
     )
     words = [word for group in _chosen(0) for word in group[:WHOLE]]
     start = spent()
-    refused = sum("refused" in entry(word) for word in words)
+    refused = sum("refused" in build_entry(word) for word in words)
     rate = len(words) / (spent() - start)
     yield (
         f"whole entries of {len(words)} keys ({refused} refused), drawing, derivation and confirmation included",
@@ -238,11 +239,11 @@ def measure_queries(file: Path) -> Row:
     lines are ready."""
     from catalog.stub import QUESTIONS
 
-    kept = store.shipped_folder()
+    kept = store.locate_shipped_folder()
     store.write_tables(file, {group: kept.lines([group], {}) for group in kept.groups()})
 
     def query(path: Path | None, options: dict[str, Any]) -> str:
-        return entries(load_catalog(path, **options).records, count(path, **options))
+        return format_entries(load_catalog(path, **options).records, count(path, **options))
 
     every = sorted(
         ((least(partial(query, file, options), turns=3)[0], options) for options in QUESTIONS), key=lambda each: each[0]
@@ -265,14 +266,14 @@ def verdicts(seed: int) -> float:
     """Exact verdicts a second, by the clock, of architectures of all groups."""
     settings = [setup for words in _chosen(seed) for setup in _prepared(words)]
     clock = time.perf_counter
-    (exact,) = least(lambda: [architecture(each).verdict(each.observed) for each in settings], turns=3, clock=clock)
+    (exact,) = least(lambda: [get_architecture(each).verdict(each.observed) for each in settings], turns=3, clock=clock)
     return len(settings) / exact
 
 
 def _chosen(seed: int) -> list[list[str]]:
     """Random keys of each group, more than needed."""
     rng = random.Random(seed)
-    return [rng.sample(sorted({without_motors(word) for word in make()}), 3 * EXACT) for make in GROUPS.values()]
+    return [rng.sample(sorted({remove_motors(word) for word in make()}), 3 * EXACT) for make in GROUPS.values()]
 
 
 def _prepared(words: list[str]) -> Iterator[ObservedRobot]:
@@ -280,7 +281,7 @@ def _prepared(words: list[str]) -> Iterator[ObservedRobot]:
     found = 0
     for word in words:
         try:
-            setup = ObservedRobot.of(mechanism(parse(word).driven), samples=10)
+            setup = ObservedRobot.of(build_mechanism(parse(word).driven), samples=10)
         except HrsynthError:
             continue
         if setup.dof and found < EXACT:

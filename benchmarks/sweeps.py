@@ -21,7 +21,7 @@ from measure import Row, Run, compare, compiled, least, plane, same, threads
 
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.batch.engine import Batch
-from hrsynth.batch.error_bounds import bounds_of
+from hrsynth.batch.error_bounds import bound_errors
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
@@ -71,7 +71,7 @@ def exact_maxima() -> Iterator[Row]:
             wanted = np.vstack([np.zeros((len(loops), basis.shape[1])), basis])
             rates = np.linalg.lstsq(np.vstack([loops, rows[:6]]), wanted, rcond=1e-9)[0]
             found.append(rows[6:] @ rates)
-        bounds_of(np.array(found).transpose(1, 2, 0), basis, np.full(2, CONE))
+        bound_errors(np.array(found).transpose(1, 2, 0), basis, np.full(2, CONE))
 
     (looped,) = least(loop, turns=3)
     what = "Mᵀ and both exact error maxima, quattro, two legs, 40,401 poses"

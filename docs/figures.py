@@ -16,11 +16,11 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 import hrsynth
-from hrsynth.present.palette import PAGE, SERIES, colour, tint
+from hrsynth.present.palette import PAGE, SERIES, get_colour, make_tint
 
 Array = NDArray[np.float64]
 FOLDER = Path(__file__).resolve().parent / "pictures"
-OBSERVED, LEG, MODE, GOAL, TYPE2 = (colour(meaning) for meaning in ("observed", "leg", "mode", "goal", "actuator"))
+OBSERVED, LEG, MODE, GOAL, TYPE2 = (get_colour(meaning) for meaning in ("observed", "leg", "mode", "goal", "actuator"))
 ROBOT = hrsynth.load("rrrrr_m1")
 A, B, C = (
     np.array([ROBOT.joints[name].point[:2] for name in names])
@@ -106,9 +106,9 @@ def find_equilibria(starts: Array) -> list[tuple[Array, Array]]:
 def draw_robot(axes: Axes, tip: Array, elbows: Array, strength: float = 1.0) -> None:
     """Draw cranks, rods (the observed segments) and tip."""
     for i in (0, 1):
-        axes.plot(*np.array([A[i], elbows[i]]).T, color=tint(LEG, strength), lw=4, solid_capstyle="round")
-        axes.plot(*np.array([elbows[i], tip]).T, color=tint(OBSERVED, strength), lw=2.5, solid_capstyle="round")
-        axes.plot(*elbows[i], "o", color="white", mec=tint(LEG, strength), ms=5)
+        axes.plot(*np.array([A[i], elbows[i]]).T, color=make_tint(LEG, strength), lw=4, solid_capstyle="round")
+        axes.plot(*np.array([elbows[i], tip]).T, color=make_tint(OBSERVED, strength), lw=2.5, solid_capstyle="round")
+        axes.plot(*elbows[i], "o", color="white", mec=make_tint(LEG, strength), ms=5)
     axes.plot(*A.T, "s", color=PAGE["ink"], ms=6)
 
 
@@ -146,7 +146,7 @@ def aspect(axes: Axes) -> None:
     tips = np.stack([x, y], -1)
     crank = solve_elbows(tips, WORKING) - A[:, None, None]
     determinant = crank[0, ..., 0] * crank[1, ..., 1] - crank[0, ..., 1] * crank[1, ..., 0]
-    axes.contourf(x, y, determinant, [-1, 0, 1], colors=[tint(SERIES[0], 0.3), tint(SERIES[4], 0.4)])
+    axes.contourf(x, y, determinant, [-1, 0, 1], colors=[make_tint(SERIES[0], 0.3), make_tint(SERIES[4], 0.4)])
     axes.contour(x, y, determinant, [0], colors=TYPE2, linewidths=2)
     label(axes, "aspect 1", np.array([-0.05, 0.2]), (0, 0))
     label(axes, "aspect 2", np.array([-0.05, -0.12]), (0, 0))

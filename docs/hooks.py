@@ -209,17 +209,17 @@ def folded(parts: list[str]) -> str:
 
 def public() -> str:
     """Return the page of public names, in the order of the index."""
-    from hrsynth.index import homes
+    from hrsynth.index import list_public_modules
 
     head = "# Public functions\n\n`import hrsynth` provides these names; each is imported at its first use."
-    return "\n\n".join([head, *(f"::: hrsynth.{module}.{name}" for name, module in homes().items())])
+    return "\n\n".join([head, *(f"::: hrsynth.{module}.{name}" for name, module in list_public_modules().items())])
 
 
 def records() -> str:
     """Return the page of JSON schemas of all commands."""
-    from hrsynth.cli.schema import page
+    from hrsynth.cli.schema import format_schema_page
 
-    return page()
+    return format_schema_page()
 
 
 def build_reference() -> Iterator[tuple[str, str]]:
@@ -230,7 +230,7 @@ def build_reference() -> Iterator[tuple[str, str]]:
 
 def modules(folder: str) -> str:
     """Return the page of a folder of the package: public names, then modules, those with public names first."""
-    from hrsynth.index import homes
+    from hrsynth.index import list_public_modules
 
     names = [
         ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts)
@@ -238,7 +238,7 @@ def modules(folder: str) -> str:
         if path.name != "__init__.py"
     ]
     called: dict[str, list[str]] = {}
-    for name, module in homes().items():
+    for name, module in list_public_modules().items():
         if f"{module}.".startswith(f"{folder}."):
             called.setdefault(f"hrsynth.{module}", []).append(name)
     order = sorted(names, key=lambda name: (name not in called, name))

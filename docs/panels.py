@@ -29,10 +29,10 @@ def tilted(name: str, folder: Path) -> Path:
     """Write a shipped robot on a tilted base."""
     from description.samples import moved
     from hrsynth import load, save
-    from hrsynth.geometry.vectors import pose, rotation_about
+    from hrsynth.geometry.vectors import build_pose, rotate_about_axis
 
     file = folder / f"{name}_tilted.urdf"
-    save(moved(load(name), pose(np.array([0.1, 0.0, 0.2]), rotation_about([1.0, -0.4, 0.2], 0.7))), file)
+    save(moved(load(name), build_pose(np.array([0.1, 0.0, 0.2]), rotate_about_axis([1.0, -0.4, 0.2], 0.7))), file)
     return file
 
 

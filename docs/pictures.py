@@ -142,10 +142,10 @@ def take_screenshot(page: Path, file: Path, what: Page) -> None:
 
 
 def run_command(command: str) -> None:
-    from hrsynth.cli import execute
+    from hrsynth.cli import run_command
 
     with contextlib.redirect_stdout(io.StringIO()) as output:
-        status = execute(shlex.split(command))
+        status = run_command(shlex.split(command))
     if status:
         raise SystemExit(f"hrsynth {command}: exit status {status}\n{output.getvalue()}")
 

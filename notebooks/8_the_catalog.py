@@ -15,8 +15,8 @@ import numpy as np
 
 import hrsynth
 from hrsynth.catalog.architecture_key import parse
-from hrsynth.catalog.drawing import drawing
-from hrsynth.catalog.geometry import mechanism
+from hrsynth.catalog.drawing import draw_architecture
+from hrsynth.catalog.geometry import build_mechanism
 
 plt.style.use("hrsynth.present.style")
 catalog = hrsynth.catalog.load()
@@ -30,7 +30,7 @@ for (group, verdict), count in catalog.count("group", "verdict").items():
 # lengths. Here is the Delta:
 
 # %%
-print(drawing(parse("3(Rt*-2SSt)")))
+print(draw_architecture(parse("3(Rt*-2SSt)")))
 delta = catalog["3(Rt*-2SSt)"]
 for name in ("key", "notation", "motion", "hidden", "verdict", "exact", "fewest", "minimal", "condition"):
     print(f"{name:12}{delta.get(name)}")
@@ -152,7 +152,7 @@ assert catalog["3(Rz*-Rz-Rz)"]["verdict"] == "controllable"
 # the previous notebooks did with a file can be done with it. Is the catalog right?
 
 # %%
-robot = mechanism(parse("3(Rt*-2SSt)"), delta.get("attempt", 0))
+robot = build_mechanism(parse("3(Rt*-2SSt)"), delta.get("attempt", 0))
 hidden = hrsynth.derive(robot, observe=delta["minimal"][0])
 print(hidden.hidden_architecture, "–", hidden.verdict.verdict, "–", hidden.equivalence)
 assert hidden.verdict.verdict == delta["verdict"]
@@ -195,6 +195,6 @@ for verdict in ("controllable", "partially controllable", "uncontrollable"):
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 3. the catalog keeps one of the smallest sets, advise lists all of them
 record = next(each for each in translational if each["verdict"] != "controllable" and each.get("suggestion"))
-advice = hrsynth.advise(mechanism(parse(record["key"]), record.get("attempt", 0)))
+advice = hrsynth.advise(build_mechanism(parse(record["key"]), record.get("attempt", 0)))
 print(record["key"], "– catalog:", record["suggestion"])
 print(advice)

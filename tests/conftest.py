@@ -27,20 +27,20 @@ def robots_observed_once() -> None:
     """What a robot was sampled at is kept for all files of a process: of the last 32 a third was drawn again."""
     from hrsynth.analysis import observed
 
-    observed._observed_robot = lru_cache(maxsize=300)(observed._observed_robot.__wrapped__)
+    observed._build_observed_robot = lru_cache(maxsize=300)(observed._build_observed_robot.__wrapped__)
 
 
 @pytest.fixture(autouse=True)
 def nothing_answered_before():
-    from hrsynth.analysis.analysis_declaration import forget_answers
+    from hrsynth.analysis.analysis_declaration import clear_results
 
-    forget_answers()
+    clear_results()
 
 
 @pytest.fixture(autouse=True)
 def nothing_said_after_half_a_minute(monkeypatch: pytest.MonkeyPatch):
     """On a busy machine commands tell on standard error what they are at; what they answer is the same."""
-    monkeypatch.setattr("hrsynth.cli.progress.SILENT", 1e6)
+    monkeypatch.setattr("hrsynth.cli.progress.PROGRESS_LINE_INTERVAL_S", 1e6)
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from hrsynth.geometry.vectors import Array, cross, hat, inverse, perpendicular, pose
+from hrsynth.geometry.vectors import Array, build_pose, cross, find_perpendicular, hat, invert_pose
 from hrsynth.mechanism.model import Joint, JointType, Mechanism
 from hrsynth.mechanism.observation import Observation
 from hrsynth.mechanism.observations.direction import Direction
@@ -92,7 +92,7 @@ def logarithm(R: Array) -> Array:
 
 def triad(axis: Array) -> Array:
     """A rotation whose third column is the unit vector ``axis``; shape (3, 3)."""
-    first = perpendicular(axis)
+    first = find_perpendicular(axis)
     return np.column_stack((first, np.cross(axis, first), axis))
 
 
@@ -186,8 +186,8 @@ moments normal to its rotations (a universal joint adds its one moment, along e1
 def rows_of(joint: Joint, i: int, j: int, X_i: Array, X_j: Array) -> Rows:
     """The wrenches reciprocal to the twists of a joint between the links i and j, which have these poses at zero."""
     rows = Rows()
-    frame = pose(joint.point, triad(joint.axis) if joint.axes else np.eye(3))
-    rows.tie(i, j, inverse(X_i) @ frame, inverse(X_j) @ frame, *RECIPROCAL[joint.type])
+    frame = build_pose(joint.point, triad(joint.axis) if joint.axes else np.eye(3))
+    rows.tie(i, j, invert_pose(X_i) @ frame, invert_pose(X_j) @ frame, *RECIPROCAL[joint.type])
     if joint.type is JointType.UNIVERSAL:
         first, second = joint.axes
         rows.moments.append((i, j, X_i[:3, :3].T @ first, X_j[:3, :3].T @ second, float(first @ second)))
@@ -235,7 +235,8 @@ class Oracle:
         return self.rows.evaluate(state)[0]
 
     def jacobian(self, state: Array) -> Array:
-        """The derivative of :meth:`residual` by the velocity; shape (rows, 6 (links - 1)); each row is a wrench."""
+        """The derivative of :meth:`compute_closure_residual` by the velocity; shape (rows, 6 (links - 1)); each row is
+        a wrench."""
         J = self.rows.evaluate(state)[1]
         return J[:, self.moving].reshape(len(J), 6 * len(self.moving))
 
@@ -359,11 +360,11 @@ class Oracle:
         rows, base, camera = Rows(), self.index[self.mechanism.base], self.index[self.mechanism.reference]
         for name, target in pins.items():
             if np.shape(target) == (3,):
-                rows.tie(base, self.index[name], pose(target), np.eye(4), ALL, ())
+                rows.tie(base, self.index[name], build_pose(target), np.eye(4), ALL, ())
             else:
                 rows.tie(base, self.index[name], target, np.eye(4), ALL, SQUARE)
         for link, d, u in aims:
-            rows.tie(camera, link, pose(rotation=triad(u)), pose(rotation=triad(d)), (), SQUARE[:2])
+            rows.tie(camera, link, build_pose(rotation=triad(u)), build_pose(rotation=triad(d)), (), SQUARE[:2])
         return rows
 
     def close(
@@ -495,4 +496,4 @@ def _pose_between(a: Array, b: Array, s: float) -> Array:
     if np.shape(b) == (3,):
         return (1 - s) * a[:3, 3] + s * b
     turn = exponential(s * logarithm(b[:3, :3] @ a[:3, :3].T))
-    return pose((1 - s) * a[:3, 3] + s * b[:3, 3], turn @ a[:3, :3])
+    return build_pose((1 - s) * a[:3, 3] + s * b[:3, 3], turn @ a[:3, :3])

@@ -14,7 +14,14 @@ import networkx as nx
 import numpy as np
 from hypothesis import strategies as st
 
-from hrsynth.geometry.vectors import Array, frozen, perpendicular, pose, rotation_about, unit
+from hrsynth.geometry.vectors import (
+    Array,
+    build_pose,
+    find_perpendicular,
+    freeze_array,
+    normalise_vector,
+    rotate_about_axis,
+)
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Joint, JointType, Link, Mechanism, Motor
 from hrsynth.mechanism.observation import Observation
@@ -32,7 +39,7 @@ Rng = np.random.Generator
 
 def random_direction(rng: Rng) -> Array:
     """A unit vector, uniform on the sphere."""
-    return unit(rng.normal(size=3))
+    return normalise_vector(rng.normal(size=3))
 
 
 def random_rotation(rng: Rng) -> Array:
@@ -44,7 +51,7 @@ def random_rotation(rng: Rng) -> Array:
 
 def random_normal(rng: Rng, axis: Array) -> Array:
     """A unit vector normal to ``axis``."""
-    return rotation_about(axis, rng.uniform(0, 2 * np.pi)) @ perpendicular(axis)
+    return rotate_about_axis(axis, rng.uniform(0, 2 * np.pi)) @ find_perpendicular(axis)
 
 
 def ring(rng: Rng, n: int, radius: float) -> list[Array]:
@@ -206,14 +213,14 @@ def pods(words: Sequence[str], rng: Rng, square: bool = False) -> Mechanism:
     n = len(words)
     dof = 6 - sum(word in ("RPS", "UPU") for word in words)
     tilt, height = random_rotation(rng), np.array([*rng.normal(scale=0.1, size=2), rng.uniform(0.9, 1.3)])
-    lean = rotation_about(random_direction(rng), rng.uniform(0.05, 0.3))
+    lean = rotate_about_axis(random_direction(rng), rng.uniform(0.05, 0.3))
     builder = Builder("pod_" + "_".join(words))
     builder.link("base")
     _add_link(builder, rng, "platform", tilt @ height)
     for number, (word, foot, tip) in enumerate(zip(words, ring(rng, n, 1.0), ring(rng, n, 0.6), strict=True), 1):
         A = tilt @ (foot + [0, 0, rng.normal(scale=0.05)])
         B = tilt @ (height + lean @ (tip + [0, 0, rng.normal(scale=0.05)]))
-        rod = unit(B - A)
+        rod = normalise_vector(B - A)
         lower, upper = f"lower_{number}", f"upper_{number}"
         _add_link(builder, rng, lower, A)
         _add_link(builder, rng, upper, B)
@@ -259,8 +266,8 @@ def deltas(bases: Sequence[str], rods: Sequence[str], rng: Rng, aligned: bool) -
     builder.link("base")
     _add_link(builder, rng, "platform", tilt @ height)
     for number, (base, rod, foot, tip) in enumerate(zip(bases, rods, feet, tips, strict=True), 1):
-        out = unit(foot)
-        elbow = foot + 0.4 * unit(out + [0, 0, -rng.uniform(0.2, 0.8)])
+        out = normalise_vector(foot)
+        elbow = foot + 0.4 * normalise_vector(out + [0, 0, -rng.uniform(0.2, 0.8)])
         turn = np.array([-out[1], out[0], 0.0])
         A, W, B = tilt @ foot, tilt @ elbow, tilt @ (height + tip)
         hinge = tilt @ turn
@@ -268,7 +275,7 @@ def deltas(bases: Sequence[str], rods: Sequence[str], rng: Rng, aligned: bool) -
         arm, first = f"arm_{number}", f"rod_{number}"
         _add_link(builder, rng, arm, W)
         builder.joint(f"motor_joint_{number}", base, "base", arm, A, axis=axis, motor=True)
-        side = 0.08 * (hinge if aligned else unit(hinge + 0.7 * random_direction(rng)))
+        side = 0.08 * (hinge if aligned else normalise_vector(hinge + 0.7 * random_direction(rng)))
         closes = number > 1
         if rod == "2-SS":
             for letter, sign in (("a", 1), ("b", -1)):
@@ -284,7 +291,7 @@ def deltas(bases: Sequence[str], rods: Sequence[str], rng: Rng, aligned: bool) -
             ("wrist", rod[1], (first, "platform"), B, closes),
         ):
             outer = hinge if aligned else random_direction(rng)
-            inner = unit(np.cross(outer, B - W)) if aligned else random_normal(rng, outer)
+            inner = normalise_vector(np.cross(outer, B - W)) if aligned else random_normal(rng, outer)
             axes = (outer, inner) if joint == "elbow" else (inner, outer)
             _add_joint(builder, f"{joint}_{number}", letter, *ends, place, axes if letter == "U" else (), loop=loop)
         builder.observe(str(number), first, B - W)
@@ -326,9 +333,9 @@ def _turned_in_link(observation: Observation, R: Array) -> Observation:
 
 def transformed(mechanism: Mechanism, R: Array, p: Array) -> Mechanism:
     """The whole geometry turned by R, then shifted by p in the base, whose own frame stays where it is."""
-    X = pose(p, R)
+    X = build_pose(p, R)
     links = {
-        name: link if name == mechanism.base else replace(link, pose=frozen(X @ link.pose))
+        name: link if name == mechanism.base else replace(link, pose=freeze_array(X @ link.pose))
         for name, link in mechanism.links.items()
     }
     joints = {
@@ -450,8 +457,8 @@ def oblique(mechanism: Mechanism, rng: Rng, name: str, angles: Sequence[float]) 
     axes = [random_direction(rng)]
     normal = random_normal(rng, axes[0])
     for angle in angles:
-        axes.append(rotation_about(normal, angle) @ axes[-1])
-        normal = rotation_about(axes[-1], rng.uniform(0.5, 2.5)) @ normal
+        axes.append(rotate_about_axis(normal, angle) @ axes[-1])
+        normal = rotate_about_axis(axes[-1], rng.uniform(0.5, 2.5)) @ normal
     return serial(mechanism, rng, mechanism.joints[name], axes)
 
 
@@ -459,7 +466,7 @@ def serial(mechanism: Mechanism, rng: Rng, joint: Joint, axes: Sequence[Array]) 
     """A joint replaced by R joints at its centre, through bare links; the last one closes the loop if it did."""
     last = len(axes) - 1
     names = [mechanism.fresh(f"{joint.name}__{k + 1}") for k in range(last + 1)]
-    middle = [Link(name, pose(joint.point, random_rotation(rng))) for name in names[:last]]
+    middle = [Link(name, build_pose(joint.point, random_rotation(rng))) for name in names[:last]]
     ends = [joint.predecessor, *names[:last], joint.successor]
     joints = [
         Joint(
@@ -480,7 +487,9 @@ def serial(mechanism: Mechanism, rng: Rng, joint: Joint, axes: Sequence[Array]) 
 def _cut(mechanism: Mechanism, rng: Rng, name: str) -> Mechanism:
     """A link cut in two by a fixed joint: some of its joints and observations move to the new half."""
     link = mechanism.links[name]
-    half = Link(mechanism.fresh(f"{name}_half"), link.pose @ pose(rng.normal(scale=0.2, size=3), random_rotation(rng)))
+    half = Link(
+        mechanism.fresh(f"{name}_half"), link.pose @ build_pose(rng.normal(scale=0.2, size=3), random_rotation(rng))
+    )
     mine = mechanism.joints_of(name)
     taken = [joint for joint in mine if rng.integers(2)] or list(mine[:1])
     carried = any(joint.in_tree and joint.successor == name for joint in taken)

@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from hrsynth.cli.schema import commands, schema
-from hrsynth.index import analyses
+from hrsynth.cli.schema import build_schema, list_json_commands
+from hrsynth.index import list_analyses
 from tables import claims
 from tables.claims import CERTAIN, CLAIMS, NO_CLAIMS
 
@@ -27,8 +27,10 @@ def texts() -> tuple[tuple[str, str], ...]:
     found = []
     for file in sorted(PACKAGE.rglob("*.py")):
         found += [(f"{file.relative_to(ROOT)}:{line}", text) for line, text in strings(file.read_text("utf-8"))]
-    found += [(f"hrsynth {name} -h", each["help"]) for name, each in analyses().items()]
-    found += [(f"hrsynth schema {name}", words) for name in commands() for words in descriptions(schema(name))]
+    found += [(f"hrsynth {name} -h", each["help"]) for name, each in list_analyses().items()]
+    found += [
+        (f"hrsynth schema {name}", words) for name in list_json_commands() for words in descriptions(build_schema(name))
+    ]
     for ending in ("html", "j2", "js"):
         for file in sorted(PACKAGE.rglob(f"*.{ending}")):
             if not file.name.endswith(".min.js"):  # a library of others

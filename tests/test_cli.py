@@ -17,7 +17,7 @@ import hrsynth
 from description.samples import FOUR_BAR
 from description.test_defects import DEFECTS, edited
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.cli import execute
+from hrsynth.cli import run_command
 from hrsynth.cli.analyses import QUESTIONS
 from hrsynth.description import list_robots
 from hrsynth.errors import BadRequest
@@ -148,7 +148,7 @@ def run(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
 
     def call(*arguments: str | Path) -> Answer:
         capfd.readouterr()
-        status = execute([str(argument) for argument in arguments])
+        status = run_command([str(argument) for argument in arguments])
         return Answer(status, *capfd.readouterr())
 
     return call
@@ -627,7 +627,7 @@ def test_check_without_an_interaction_matrix_draws_nothing(run, tmp_path: Path):
 
 
 def test_check_answers_3_where_a_rank_is_not_clear(run, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("hrsynth.analysis.configuration_report.RANK_GAP", 1e30)
+    monkeypatch.setattr("hrsynth.analysis.configuration_report.RANK_GAP_MIN", 1e30)
     asked = run("check", "3rrr_m1", "--at", "x=0.01")
     assert asked.status == 3
     assert "undecided (smallest rank gap" in asked.out
@@ -898,7 +898,7 @@ def test_a_robot_of_one_freedom_has_no_plane(
 
 @pytest.mark.slow
 def test_singular_answers_3_where_condition_and_rank_disagree(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("hrsynth.analysis.singularity.condition_check.RANK_CUTOFF", 1e-30)
+    monkeypatch.setattr("hrsynth.analysis.singularity.condition_check.RANK_CUTOFF_FRACTION", 1e-30)
     picture = tmp_path / "locus.png"
     (line,) = run("singularities", "rrrrr_m1", "--points", "100", "--steps", "5", "-o", picture).refused(3)
     assert "the condition and the rank disagree" in line

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from hrsynth.cli import execute
+from hrsynth.cli import run_command
 
 QUATTRO = ("accuracy", "quattro", "--observe", "1,4", "--cone", "0.1deg")
 
 
 def told(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
-    status = execute(list(arguments))
+    status = run_command(list(arguments))
     out, err = capsys.readouterr()
     return status, out, err
 

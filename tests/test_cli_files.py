@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hrsynth.cli import execute
+from hrsynth.cli import run_command
 from hrsynth.cli.progress import Progress
 from hrsynth.present.outputs import FIGURES, OUTPUTS
 
@@ -56,7 +56,7 @@ def test_every_drawing_command_is_among_them():
     ("arguments", "files"), [each for group in FILES.values() for each in group], ids=lambda each: " ".join(each)
 )
 def test_one_sentence_names_what_is_written(here: Path, capsys, arguments: list[str], files: list[str]):
-    assert execute(arguments) == 0
+    assert run_command(arguments) == 0
     out = capsys.readouterr().out
     assert sorted(path.name for path in here.iterdir()) == sorted(files)
     sentences = [line for line in out.splitlines() if "is written to" in line]
@@ -77,7 +77,7 @@ def test_figures_are_written_as_wide_as_asked(here: Path, capsys, name: str):
     widths = {"120mm": 120 / 25.4, "11.5cm": 11.5 / 2.54, "4.5in": 4.5}
     for ending, (width, inches) in zip(FIGURES, widths.items(), strict=True):
         file = here / f"figure{ending}"
-        assert execute([*DRAWN[name], "-o", str(file), "--width", width, "--font", "serif"]) == 0
+        assert run_command([*DRAWN[name], "-o", str(file), "--width", width, "--font", "serif"]) == 0
         assert width_of(file) == pytest.approx(inches, abs=0.02), (ending, width)
     assert capsys.readouterr().err == ""
 
@@ -96,14 +96,18 @@ def width_of(file: Path) -> float:
 def test_a_figure_has_the_font_that_is_asked_for(here: Path):
     for font, inside in (("serif", b"Serif"), ("DejaVu Sans Mono 11pt", b"SansMono")):
         file = here / "figure.pdf"
-        assert execute([*DRAWN["check"], "-o", str(file), "--font", font]) == 0
+        assert run_command([*DRAWN["check"], "-o", str(file), "--font", font]) == 0
         assert re.search(rb"/BaseFont /\S*" + inside, file.read_bytes())
 
 
 @pytest.mark.slow
 def test_the_same_figure_twice_is_the_same_file(here: Path):
     for ending in FIGURES:
-        assert execute([*DRAWN["check"], "-o", f"a{ending}"]) == execute([*DRAWN["check"], "-o", f"b{ending}"]) == 0
+        assert (
+            run_command([*DRAWN["check"], "-o", f"a{ending}"])
+            == run_command([*DRAWN["check"], "-o", f"b{ending}"])
+            == 0
+        )
         assert (here / f"a{ending}").read_bytes() == (here / f"b{ending}").read_bytes()
 
 
@@ -169,7 +173,7 @@ def test_a_robot_without_strokes_is_not_in_the_legend(tmp_path: Path):
     ],
 )
 def test_a_figure_that_cannot_be_is_refused(here: Path, capsys, arguments: list[str], words: list[str]):
-    assert execute([*DRAWN["check"], "-o", "map.png", *arguments]) == 2
+    assert run_command([*DRAWN["check"], "-o", "map.png", *arguments]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert all(word in line for word in words), line
     assert list(here.iterdir()) == []
@@ -177,7 +181,7 @@ def test_a_figure_that_cannot_be_is_refused(here: Path, capsys, arguments: list[
 
 def test_width_and_font_are_of_figures(here: Path, capsys):
     for more in ([], ["-o", "map.csv"]):
-        assert execute([*DRAWN["check"], *more, "--width", "88mm"]) == 2
+        assert run_command([*DRAWN["check"], *more, "--width", "88mm"]) == 2
         assert "--output with .png, .pdf, .svg" in capsys.readouterr().err
     assert list(here.iterdir()) == []
 
@@ -226,7 +230,7 @@ def test_short_work_has_no_bar(monkeypatch: pytest.MonkeyPatch, capsys):
 
 @pytest.mark.parametrize("text", ["x=1_0", "x=１", "x=0x1", "x=1e", "x=", "phi=1_0deg", "x=١"])
 def test_only_plain_numbers_are_numbers(capsys, text: str):
-    assert execute(["check", "3rrr_m1", "--at", text]) == 2
+    assert run_command(["check", "3rrr_m1", "--at", text]) == 2
     assert "is not a number" in capsys.readouterr().err
 
 

@@ -10,7 +10,7 @@ import pytest
 from description.foreign.examples import FILES
 from description.foreign.test_dialects import written
 from description.foreign.test_traps import bars, origin
-from hrsynth.cli import execute
+from hrsynth.cli import run_command
 
 COMMANDS = ("derive", "legs", "check", "singularities", "advise", "modes", "path", "convert")
 
@@ -19,7 +19,7 @@ COMMANDS = ("derive", "legs", "check", "singularities", "advise", "modes", "path
 def call(capfd: pytest.CaptureFixture[str]):
     def run(*arguments: object) -> tuple[int, str, list[str]]:
         capfd.readouterr()
-        status = execute([str(argument) for argument in arguments])
+        status = run_command([str(argument) for argument in arguments])
         out, err = capfd.readouterr()
         return status, out, err.splitlines()
 

@@ -17,9 +17,9 @@ from typing import Any
 import pytest
 
 import hrsynth
-from hrsynth.cli import app, execute
+from hrsynth.cli import app, run_command
 from hrsynth.cli.analyses import QUESTIONS
-from hrsynth.cli.completion import candidates
+from hrsynth.cli.completion import list_completions
 from hrsynth.description import list_robots
 from hrsynth.options import OBSERVATION, OUTPUT, OVERRIDES
 
@@ -30,7 +30,7 @@ LEAVES = [(name,) for name, each in ROOT.commands.items() if not hasattr(each, "
 
 
 def called(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    assert execute(list(arguments)) == 0
+    assert run_command(list(arguments)) == 0
     return capsys.readouterr().out
 
 
@@ -171,7 +171,7 @@ def test_a_flag_can_be_denied_and_words_that_repeat_are_all_taken():
     ],
 )
 def test_what_cannot_be_read_is_refused_in_one_line(capsys, words: str, told: str):
-    assert execute(words.split()) == 2
+    assert run_command(words.split()) == 2
     shown = capsys.readouterr()
     assert told in shown.err
     assert shown.out == ""
@@ -191,10 +191,10 @@ def test_what_cannot_be_read_is_refused_in_one_line(capsys, words: str, told: st
 def test_examples_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys, arguments: tuple[str, ...]):
     monkeypatch.chdir(tmp_path)
     if "c.json" in arguments and arguments[0] == "verify":  # the file that the example of modes writes
-        assert execute(["modes", "quattro", "--observe", "1,4", "--certificate", "c.json"]) == 0
+        assert run_command(["modes", "quattro", "--observe", "1,4", "--certificate", "c.json"]) == 0
     if "leg.xml" in arguments:
-        assert execute(["convert", "3rrr_m1", "leg.xml"]) == 0
-    assert execute(list(arguments)) == 0, capsys.readouterr().err
+        assert run_command(["convert", "3rrr_m1", "leg.xml"]) == 0
+    assert run_command(list(arguments)) == 0, capsys.readouterr().err
     assert capsys.readouterr().err == ""
 
 
@@ -210,7 +210,7 @@ def test_python_m_hrsynth_is_the_command_line():
 
 def test_the_old_names_of_start_and_goal_are_no_options(capsys):
     for old in ("--from", "--to"):
-        assert execute(["path", "rrrrr_m1", "--start", "x=0.05", old, "x=0.01"]) == 2
+        assert run_command(["path", "rrrrr_m1", "--start", "x=0.05", old, "x=0.01"]) == 2
         assert f"path has no option {old}. " in capsys.readouterr().err
 
 
@@ -231,21 +231,27 @@ def test_the_old_names_of_start_and_goal_are_no_options(capsys):
     ],
 )
 def test_completion_knows_commands_options_and_words(typed: list[str], expected: list[str]):
-    assert candidates(ROOT, typed) == expected
+    assert list_completions(ROOT, typed) == expected
 
 
 def test_completion_knows_robots_and_every_option():
-    assert candidates(ROOT, ["derive", ""]) == candidates(ROOT, ["lint", "a.urdf", ""]) == list(list_robots())
+    assert (
+        list_completions(ROOT, ["derive", ""]) == list_completions(ROOT, ["lint", "a.urdf", ""]) == list(list_robots())
+    )
     for path in LEAVES:
-        offered = candidates(ROOT, [*path, "--"])
+        offered = list_completions(ROOT, [*path, "--"])
         known = {part for each in command(path).options for name in each.names for part in name.split("/")}
         assert {*offered} - {"--help"} == {name for name in known if name.startswith("--")}
 
 
 def test_completion_knows_the_examples_once_they_are_begun():
     known = [f"example:{name}" for name in hrsynth.list_examples()]
-    assert candidates(ROOT, ["derive", "exa"]) == candidates(ROOT, ["verify", "c.json", "--robot", "example:"]) == known
-    assert candidates(ROOT, ["derive", "example:cassie"])[0].startswith("example:cassie")
+    assert (
+        list_completions(ROOT, ["derive", "exa"])
+        == list_completions(ROOT, ["verify", "c.json", "--robot", "example:"])
+        == known
+    )
+    assert list_completions(ROOT, ["derive", "example:cassie"])[0].startswith("example:cassie")
 
 
 def test_bash_replaces_what_stands_after_the_colon(capsys, tmp_path: Path):
@@ -296,7 +302,7 @@ def test_a_shell_completes_with_its_script(capsys, tmp_path: Path, shell: str):
 @pytest.mark.some(1)
 @pytest.mark.parametrize(("more", "coloured"), [({}, True), ({"NO_COLOR": "1"}, False), ({"TERM": "dumb"}, False)])
 def test_colour_is_for_terminals_whose_user_wants_it(more: dict[str, str], coloured: bool, capsys):
-    assert execute(["legs", "3rrr_m1"]) == 0
+    assert run_command(["legs", "3rrr_m1"]) == 0
     plain = capsys.readouterr().out
     assert "\x1b" not in plain
     main, end = pty.openpty()
@@ -320,12 +326,12 @@ def test_colour_is_for_terminals_whose_user_wants_it(more: dict[str, str], colou
 
 
 def test_groups_of_commands_have_examples_too(capsys):
-    assert execute(["catalog", "-h"]) == 0
+    assert run_command(["catalog", "-h"]) == 0
     assert "Examples:\n  hrsynth catalog list --legs 3-R*RR --verdict controllable\n" in capsys.readouterr().out
 
 
 def test_a_command_without_a_record_is_told_from_no_command(capsys):
-    assert execute(["schema", "studio"]) == 2
+    assert run_command(["schema", "studio"]) == 2
     assert "command without JSON: got 'studio'" in capsys.readouterr().err
-    assert execute(["schema", "stodio"]) == 2
+    assert run_command(["schema", "stodio"]) == 2
     assert "unknown command: got 'stodio'" in capsys.readouterr().err

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from description.samples import FOUR_BAR
-from hrsynth.cli import execute
+from hrsynth.cli import run_command
 from hrsynth.description import load, save
 
 SECONDS = 60
@@ -97,7 +97,7 @@ def test_a_dialog_closes_a_loop_and_its_command_writes_the_same_bytes(tmp_path: 
     assert "Traceback" not in shown
     robot = load(tmp_path / "closed.urdf")
     assert robot.platform == "bar"
-    assert [name for name, joint in robot.joints.items() if joint.actuated] == ["a"]
+    assert [name for name, joint in robot.joints.items() if joint.is_actuated] == ["a"]
     assert sum(not joint.in_tree for joint in robot.joints.values()) == 1
     written = (tmp_path / "closed.urdf").read_bytes()
     (tmp_path / "closed.urdf").unlink()
@@ -157,11 +157,11 @@ def test_without_a_terminal_guesses_are_taken_and_told(ending: str, tmp_path: Pa
     if ending == ".xml":
         text = Path("robot.xml").read_text()
         Path("robot.xml").write_text("\n".join(line for line in text.splitlines() if "hrsynth_platform" not in line))
-    assert execute(["import", f"robot{ending}", "-o", "out.urdf"]) == 0
+    assert run_command(["import", f"robot{ending}", "-o", "out.urdf"]) == 0
     out, err = capsys.readouterr()
     assert ("assumption: the platform" in err) is (ending == ".xml")
     written = Path("out.urdf").read_bytes()
-    assert execute(shlex.split(out.rpartition("questions: ")[2])[1:]) == 0
+    assert run_command(shlex.split(out.rpartition("questions: ")[2])[1:]) == 0
     assert Path("out.urdf").read_bytes() == written
     robot, back = load("3rps"), load("out.urdf")
     assert (back.base, back.platform) == (robot.base, robot.platform)
@@ -184,9 +184,9 @@ def test_a_robot_without_motors_is_told(tmp_path: Path, capsys, monkeypatch):
             "out.urdf",
             *["--motors", motors] * bool(motors),
         ]
-        assert execute(asked) == 0
+        assert run_command(asked) == 0
         assert ("no joint is driven" in capsys.readouterr().err) is told
-        assert execute([*asked, "--json"]) == 0
+        assert run_command([*asked, "--json"]) == 0
         assert any("no joint is driven" in note for note in json.loads(capsys.readouterr().out)["notes"]) is told
 
 
@@ -207,7 +207,7 @@ def test_its_record_holds_the_command(tmp_path: Path, capsys, monkeypatch):
         "-o",
         "out.urdf",
     ]
-    assert execute([*asked, "--json"]) == 0
+    assert run_command([*asked, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (found["base"], found["platform"]["link"], found["motors"]) == ("base", "bar", ["a"])
     assert "crank" in found["observed"].values()
@@ -231,7 +231,7 @@ def test_what_is_refused_is_one_line_and_writes_nothing(
 ):
     monkeypatch.chdir(tmp_path)
     told_of(tmp_path)
-    assert execute(asked) == 2
+    assert run_command(asked) == 2
     err = capsys.readouterr().err
     assert said in err
     assert err.count("\n") <= 2

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 import hrsynth
 from hrsynth.characters import STEERING, escape_steering, name_steering, restore_steering
-from hrsynth.cli import execute
+from hrsynth.cli import run_command
 from hrsynth.present.studio.worker import answer_message
 
 STEERED = re.compile(f"[{STEERING}]")
@@ -54,7 +54,7 @@ ASKED = (
 @pytest.mark.some(4)
 @pytest.mark.parametrize("asked", ASKED, ids=" ".join)
 def test_no_output_steers_a_terminal(asked: list[str], hostile: Path, capsys: pytest.CaptureFixture[str]):
-    assert execute([asked[0], str(hostile), *asked[1:]]) in (0, 1, 2)
+    assert run_command([asked[0], str(hostile), *asked[1:]]) in (0, 1, 2)
     said = capsys.readouterr()
     assert not STEERED.search(said.out + said.err)
     assert "\\u202e" in said.out + said.err
@@ -71,7 +71,7 @@ def test_no_output_steers_a_terminal(asked: list[str], hostile: Path, capsys: py
 @pytest.mark.filterwarnings("ignore:Glyph")
 def test_no_page_is_steered_by_a_name(asked: list[str], hostile: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
-    assert execute([asked[0], str(hostile), *asked[1:]]) == 0
+    assert run_command([asked[0], str(hostile), *asked[1:]]) == 0
     page = Path(asked[-1]).read_text(encoding="utf-8")
     assert not STEERED.search(page)
     for data in re.findall(r'<script type="application/json"[^>]*>(.*?)</script>', page, re.DOTALL):

@@ -11,8 +11,8 @@ import pytest
 from jsonschema import Draft202012Validator
 
 import hrsynth
-from hrsynth.cli import execute
-from hrsynth.cli.schema import commands, page, schema
+from hrsynth.cli import run_command
+from hrsynth.cli.schema import build_schema, format_schema_page, list_json_commands
 
 QUICK = {
     "derive": [
@@ -76,22 +76,23 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def answered(capsys: pytest.CaptureFixture[str], text: str) -> dict:
     capsys.readouterr()
-    assert execute([*shlex.split(text), "--json"]) == 0, capsys.readouterr().err
+    assert run_command([*shlex.split(text), "--json"]) == 0, capsys.readouterr().err
     return json.loads(capsys.readouterr().out)
 
 
 def wrong(command: str, record: dict) -> list[str]:
-    found = Draft202012Validator(schema(command)).iter_errors(record)
+    found = Draft202012Validator(build_schema(command)).iter_errors(record)
     return [f"{'/'.join(map(str, each.absolute_path))}: {each.message[:200]}" for each in found]
 
 
 @pytest.mark.some(2)
 @pytest.mark.parametrize(
-    "command", [pytest.param(each, marks=[pytest.mark.slow] * each.startswith("catalog")) for each in commands()]
+    "command",
+    [pytest.param(each, marks=[pytest.mark.slow] * each.startswith("catalog")) for each in list_json_commands()],
 )
 def test_every_answer_is_what_its_schema_says(here: Path, capsys, command: str):
     if command == "verify":
-        assert execute(["modes", "3rrr_m1", "--certificate", "c.json"]) == 0
+        assert run_command(["modes", "3rrr_m1", "--certificate", "c.json"]) == 0
     for arguments in QUICK[command]:
         record = answered(capsys, f"{command} {arguments}")
         assert (record["command"], record["version"]) == (command, hrsynth.__version__)
@@ -99,7 +100,7 @@ def test_every_answer_is_what_its_schema_says(here: Path, capsys, command: str):
 
 
 def test_every_command_with_json_is_tried():
-    assert {*commands()} == {*QUICK}
+    assert {*list_json_commands()} == {*QUICK}
 
 
 def test_a_schema_refuses_what_is_wrong(here: Path, capsys):
@@ -120,12 +121,12 @@ def test_a_schema_refuses_what_is_wrong(here: Path, capsys):
 
 
 def test_schemas_are_sound_printed_and_on_their_page(capsys):
-    shown = page()
-    for command in commands():
-        Draft202012Validator.check_schema(schema(command))
+    shown = format_schema_page()
+    for command in list_json_commands():
+        Draft202012Validator.check_schema(build_schema(command))
         capsys.readouterr()
-        assert execute(["schema", *command.split()]) == 0
-        assert json.loads(capsys.readouterr().out) == schema(command)
+        assert run_command(["schema", *command.split()]) == 0
+        assert json.loads(capsys.readouterr().out) == build_schema(command)
         assert f'??? abstract "{command}"' in shown
-    assert execute(["schema", "nothing"]) == 2
+    assert run_command(["schema", "nothing"]) == 2
     assert "catalog list" in capsys.readouterr().err

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from hrsynth.cli import execute
+from hrsynth.cli import run_command
 from present.studio_client import alive, soon
 
 pytest.importorskip("uvicorn")
@@ -70,7 +70,7 @@ def test_it_ends_cleanly_and_leaves_nothing(tmp_path: Path, number: signal.Signa
 
 
 def ask(capfd: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
-    status = execute(["studio", "--no-browser", *arguments])
+    status = run_command(["studio", "--no-browser", *arguments])
     return status, *capfd.readouterr()
 
 

@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 
 import hrsynth
-from hrsynth.cli import execute
+from hrsynth.cli import run_command
 
 
 def ask(capfd: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
-    status = execute(["view", *arguments])
+    status = run_command(["view", *arguments])
     out, err = capfd.readouterr()
     return status, out, err
 
@@ -83,7 +83,7 @@ def test_the_page_is_told_what_the_command_line_says(
     class Seen:
         address = "http://127.0.0.1:1/x/"
 
-        def __init__(self, opening: server.Opening, port: int) -> None:
+        def __init__(self, opening: server.StartupState, port: int) -> None:
             told.append((opening, port))
 
         def wait(self) -> None:
@@ -94,7 +94,7 @@ def test_the_page_is_told_what_the_command_line_says(
 
     monkeypatch.setattr(server, "StudioServer", Seen)
     file = str(tmp_path / "leg.xml")
-    assert execute(["convert", "3rrr_m1", file]) == 0
+    assert run_command(["convert", "3rrr_m1", file]) == 0
     capfd.readouterr()
     motors = ("shoulder_1", "shoulder_2", "shoulder_3")
     status, out, err = ask(

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import hrsynth
-from hrsynth.cli import execute
+from hrsynth.cli import run_command
 from hrsynth.description import list_robots
 from hrsynth.geometry.vectors import orient_axis
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
-from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.normal import reduce_to_normal_form
 from hrsynth.mechanism.pose import Pose
-from hrsynth.present.text.tables import table
+from hrsynth.present.text.tables import format_table
 
 NUMBER = r"-?\d[\d.]*(?:e[-+]\d+)?"
 
@@ -25,7 +25,7 @@ NUMBER = r"-?\d[\d.]*(?:e[-+]\d+)?"
 def printed(capsys: pytest.CaptureFixture[str]):
     def call(text: str) -> str:
         capsys.readouterr()
-        assert execute(text.split()) == 0, capsys.readouterr().err
+        assert run_command(text.split()) == 0, capsys.readouterr().err
         return capsys.readouterr().out
 
     return call
@@ -75,7 +75,7 @@ def test_what_is_printed_can_be_typed_again(typed: str):
 
 
 def test_an_error_shows_a_pose_as_it_was_typed(capsys):
-    assert execute(["check", "quattro", "--at", "x=9,phi=30deg"]) == 3
+    assert run_command(["check", "quattro", "--at", "x=9,phi=30deg"]) == 3
     assert "the pose x=9,phi=30deg is not reached" in capsys.readouterr().err
     assert str(Pose.parse(" x = 0.020, phi = 10 deg")) == "x=0.020,phi=10 deg"
     assert Pose.parse("phi=180deg") == Pose(phi=math.pi)
@@ -93,7 +93,7 @@ def test_loops_are_named_as_in_the_file(name: str):
     written = [joint.name for joint in robot.joints.values() if not joint.in_tree]
     named = PinocchioModel(robot).loops
     assert sorted(named) == sorted(written)
-    mechanism = normal_form(robot).mechanism
+    mechanism = reduce_to_normal_form(robot).mechanism
     inside = {joint.name for joint in mechanism.joints.values() if not joint.in_tree}
     assert {*PinocchioModel(mechanism).loops} >= inside & {*written}
 
@@ -202,7 +202,7 @@ def test_tables_and_lists_are_not_wider_than_a_hundred_columns(printed, command:
 
 def test_a_wrapped_column_keeps_its_words():
     words = " ".join(f"word{i}" for i in range(60))
-    lines = table([("a", words), ("b", "")], ("one", "two")).splitlines()
+    lines = format_table([("a", words), ("b", "")], ("one", "two")).splitlines()
     assert max(map(len, lines)) <= 100
     assert " ".join(line[5:] for line in lines[2:-1]) == words
     assert [line[:1] for line in lines[2:]] == ["a", *" " * (len(lines) - 4), "b"]
@@ -223,7 +223,7 @@ def test_a_turn_of_more_than_half_a_circle_without_a_unit_is_told_in_degrees(
     command: str, told: str | None, capsys: pytest.CaptureFixture[str]
 ) -> None:
     capsys.readouterr()
-    execute(command.split())
+    run_command(command.split())
     said = capsys.readouterr().err
     assert ("radians" in said) is (told is not None)
     assert told is None or told in said
@@ -241,7 +241,7 @@ def test_the_pose_of_a_question_is_named_where_another_name_is_given(
     command: str, usual: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     capsys.readouterr()
-    assert execute(command.split()) == 2
+    assert run_command(command.split()) == 2
     assert f"has no option --at. Use {usual} for the pose." in capsys.readouterr().err
 
 

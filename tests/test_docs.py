@@ -13,7 +13,7 @@ import pytest
 
 import hrsynth
 from browser import Tab
-from hrsynth.cli import execute
+from hrsynth.cli import run_command
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "docs"))
@@ -64,7 +64,7 @@ EXAMPLES = sorted(
 @pytest.mark.slow
 @pytest.mark.parametrize("line", EXAMPLES)
 def test_commands_on_robots_of_example_robot_data_work(line: str, capsys):
-    assert execute(shlex.split(line)) == 0, capsys.readouterr().err
+    assert run_command(shlex.split(line)) == 0, capsys.readouterr().err
 
 
 @pytest.fixture(scope="module")

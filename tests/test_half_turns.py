@@ -18,14 +18,14 @@ from hrsynth.analysis.accuracy import accuracy as accuracies
 from hrsynth.analysis.accuracy.measurement_bounds import MeasurementBounds
 from hrsynth.analysis.aspects.path import PathPlanner
 from hrsynth.analysis.modes.modes import modes
-from hrsynth.analysis.observed import ObservedRobot, motors
-from hrsynth.analysis.singularity.condition_check import weakest
-from hrsynth.analysis.singularity.locus import locus
+from hrsynth.analysis.observed import ObservedRobot, build_motor_model
+from hrsynth.analysis.singularity.condition_check import compute_smallest_value
+from hrsynth.analysis.singularity.locus import compute_locus
 from hrsynth.batch.iterative_leg import IterativeLeg
-from hrsynth.batch.pose_continuation import reach
+from hrsynth.batch.pose_continuation import track_to_pose
 from hrsynth.description import load
-from hrsynth.errors import BadRequest, NoReachablePose, PoseNotReached
-from hrsynth.geometry.vectors import Array, rotation_from_rpy
+from hrsynth.errors import BadRequest, NoReachablePose, PoseReachFailure
+from hrsynth.geometry.vectors import Array, convert_rpy_to_rotation
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.continuation import track
 from hrsynth.kinematics.tasks import PoseAndValuesTask
@@ -108,7 +108,7 @@ def wanted_poses(setup: ObservedRobot, count: int, seed: int) -> Iterator[tuple[
 
 def rotation(pose: Pose) -> Array:
     assert pose.rpy is not None
-    return rotation_from_rpy(*pose.rpy)
+    return convert_rpy_to_rotation(*pose.rpy)
 
 
 def assert_there(setup: ObservedRobot, at: ClosedConfiguration, X: Array) -> None:
@@ -122,7 +122,7 @@ Answer = Sequence[ClosedConfiguration]
 
 def reached(case: Case, pose: Pose) -> Answer:
     all_samples = case.setting.all_samples
-    return [reach(all_samples.start, all_samples.observation_model, pose, case.setting.motion)]
+    return [track_to_pose(all_samples.start, all_samples.observation_model, pose, case.setting.motion)]
 
 
 def led_whole(case: Case, pose: Pose) -> Answer:
@@ -131,7 +131,7 @@ def led_whole(case: Case, pose: Pose) -> Answer:
     X[:3, :3], X[:3, 3] = pose.rotation, [pose.x, pose.y, pose.z]
     at, came = track(case.setting.all_samples.start, case.setting.motion, case.setting.motion.whole(X))
     if came < 1:
-        raise PoseNotReached(case.robot.name, str(pose), came, "")
+        raise PoseReachFailure(case.robot.name, str(pose), came, "")
     return [at]
 
 
@@ -182,7 +182,9 @@ def mapped(case: Case, pose: Pose) -> Answer:
     field = accuracies.accuracy(case.robot, case.observe, cone=1e-3, grid=grid).field
     assert field is not None
     if field.reached[0]:
-        single = accuracies.errors_at(case.setting, MeasurementBounds(np.full(len(case.setting.observed), 1e-3)), at[0])
+        single = accuracies.compute_errors_at(
+            case.setting, MeasurementBounds(np.full(len(case.setting.observed), 1e-3)), at[0]
+        )
         assert field.position[0] == pytest.approx(single.position.largest, rel=1e-2)
     return at
 
@@ -190,12 +192,14 @@ def mapped(case: Case, pose: Pose) -> Answer:
 def located(case: Case, pose: Pose) -> Answer:
     """Over a plane of poses turned alike: the nearest cell's distance from a singularity is that of its pose."""
     plane = Pose(z=pose.z if case.setting.motion.translations.shape[1] == 3 else None, rpy=pose.rpy)
-    found = locus(case.setting, plane=plane, steps=5)
+    found = compute_locus(case.setting, plane=plane, steps=5)
     cell = np.unravel_index(np.nanargmax(found.hidden.type2), found.grid.shape)
     (there,) = found.grid.poses_at([tuple(map(int, cell))])
     assert there.rpy == plane.rpy
     (at,) = reached(case, there)
-    assert found.hidden.type2[cell] == pytest.approx(weakest(at, case.setting.samples.observation_model), rel=1e-6)
+    assert found.hidden.type2[cell] == pytest.approx(
+        compute_smallest_value(at, case.setting.samples.observation_model), rel=1e-6
+    )
     return reached(case, pose)
 
 
@@ -227,7 +231,7 @@ def answers(robot: str, command: str, count: int, seed: int) -> Counter[str]:
     for X, pose in wanted_poses(case.setting, count, seed):
         try:
             found = (COMMANDS | SLOW)[command](case, pose)
-        except (PoseNotReached, NoReachablePose, BadRequest) as error:
+        except (PoseReachFailure, NoReachablePose, BadRequest) as error:
             told[type(error).__name__] += len(error.lines())
             continue
         for at in found:
@@ -240,7 +244,7 @@ def test_a_motor_at_half_a_turn_is_held_from_either_side() -> None:
     """Its angle is π and −π there; the way to it is as short from both sides."""
     case = case_of("3rrr_m1")
     setup, model = case.setting, case.setting.all_samples.model
-    (encoder, *_) = motors(setup).observations
+    (encoder, *_) = build_motor_model(setup).observations
     assert isinstance(encoder, AngleEncoder)
     bare = PoseAndValuesTask(setup.motion.link, np.eye(4), np.zeros(3), setup.mechanism.reference, ())
     (crank,) = model.coordinates[encoder.joint]
@@ -308,7 +312,7 @@ def test_a_map_is_of_the_poses_that_were_wanted(robot: str) -> None:
 
 @pytest.mark.slow
 def test_a_pose_out_of_reach_is_refused() -> None:
-    assert answers("3rrr_m1", "reached", 3, 0) == {"PoseNotReached": 3}
+    assert answers("3rrr_m1", "reached", 3, 0) == {"PoseReachFailure": 3}
 
 
 @pytest.mark.long

@@ -9,21 +9,21 @@ from inspect import signature
 import pytest
 
 import hrsynth
-from hrsynth.index import INDEX, STUB, analyses, index_text, options, stub_text
-from hrsynth.options import NEEDED, options_of
+from hrsynth.index import INDEX, STUB, format_index, format_stub, list_analyses, list_analysis_options
+from hrsynth.options import NEEDED, list_options
 
 
 def test_the_files_are_made_of_the_declarations():
-    assert INDEX.read_text(encoding="utf-8") == index_text(), "run make index"
-    assert STUB.read_text(encoding="utf-8") == stub_text(), "run make index"
+    assert INDEX.read_text(encoding="utf-8") == format_index(), "run make index"
+    assert STUB.read_text(encoding="utf-8") == format_stub(), "run make index"
 
 
-@pytest.mark.parametrize("name", analyses())
+@pytest.mark.parametrize("name", list_analyses())
 def test_options_come_back_from_the_index_as_they_are_declared(name: str):
     function = getattr(hrsynth, name)
-    assert options(name) == list(function.declaration.options) == list(options_of(function.__wrapped__))
+    assert list_analysis_options(name) == list(function.declaration.options) == list(list_options(function.__wrapped__))
     known = signature(function).parameters
-    for option in options(name):
+    for option in list_analysis_options(name):
         default = known[option.name].default
         assert option.default == (NEEDED if default is known[option.name].empty else default or option.default)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import hrsynth
-from hrsynth.errors import BadRequest, HrsynthError, PoseNotReached
+from hrsynth.errors import BadRequest, HrsynthError, PoseReachFailure
 
 ROBOTS, LEGS = ["3rrr_m1", "3rpr_m1"], [[1, 2], "1,3"]
 POSES = [[0, 0, 0], [9, 0, 0], {"x": 0.02, "y": 0, "phi": 0.01}]
@@ -38,13 +38,13 @@ def test_answers_are_those_of_the_questions_one_by_one_in_their_order():
         found = hrsynth.map_robots(hrsynth.check, ROBOTS, legs=LEGS, poses=POSES, jobs=jobs, errors="keep")
         assert len(found) == len(expected) == 12
         assert all(map(same, found, expected)), jobs
-        assert sum(isinstance(each, PoseNotReached) for each in found) == 2
+        assert sum(isinstance(each, PoseReachFailure) for each in found) == 2
 
 
 @pytest.mark.slow
 def test_an_error_ends_all_and_says_what_was_asked():
     for jobs in (1, 2):
-        with pytest.raises(PoseNotReached) as caught:
+        with pytest.raises(PoseReachFailure) as caught:
             hrsynth.map_robots("check", ROBOTS, poses=POSES, jobs=jobs)
         (note,) = caught.value.__notes__
         assert note.startswith("asked: robot <Mechanism: 3rrr_m1")

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hrsynth.geometry.vectors import Array, pose
+from hrsynth.geometry.vectors import Array, build_pose
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Joint, JointType, Link, Mechanism
 from hrsynth.mechanism.observation import Observation
@@ -347,7 +347,7 @@ def lifted(mechanism: Mechanism) -> Mechanism:
             Joint(name, JointType(letter), ends[k], ends[k + 1], at, axes[k], in_tree=k < 4)
             for k, (name, letter) in enumerate(zip(names, "PPPUR", strict=True))
         ]
-        mechanism = mechanism.changed(links=[Link(name, pose(at)) for name in names[:4]], joints=joints)
+        mechanism = mechanism.changed(links=[Link(name, build_pose(at)) for name in names[:4]], joints=joints)
     return mechanism
 
 

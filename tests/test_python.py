@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 import hrsynth
-from hrsynth.errors import BadRequest, CertificateRefused
+from hrsynth.errors import BadRequest, InvalidCertificate
 
 FUNCTIONS = sorted({*hrsynth.__all__} - {"__version__", "catalog"})
 SLOW = {"aspects", "draw", "select"}
@@ -136,7 +136,7 @@ def test_a_certificate_is_about_its_robot_alone():
     record = hrsynth.certificate(hrsynth.modes("rrrrr_m1"))
     hrsynth.verify(record, "rrrrr_m1")
     for other in ("delta", "3rrr_m1"):
-        with pytest.raises(CertificateRefused, match=f"it is not for {other}"):
+        with pytest.raises(InvalidCertificate, match=f"it is not for {other}"):
             hrsynth.verify(record, other)
 
 

@@ -16,7 +16,7 @@ import pytest
 
 import hrsynth
 from hrsynth.errors import BadRequest, HrsynthError, MissingExtra
-from hrsynth.mechanism.pose import Pose, as_pose, asked_pose, asked_poses
+from hrsynth.mechanism.pose import Pose, convert_to_pose, parse_pose, parse_poses
 
 TURNED = "x=0.01,y=0.02,z=-0.75,rpy=0/0/0.2"
 FUNCTIONS = (
@@ -56,14 +56,14 @@ def test_a_pose_is_taken_in_every_form():
         X.tolist(),
         pin.SE3(X),
     ):
-        found = as_pose(given)
+        found = convert_to_pose(given)
         assert list(found.given) == list(told.given)
         np.testing.assert_allclose(
             np.hstack(list(found.given.values())), np.hstack(list(told.given.values())), atol=1e-15
         )
-    assert as_pose({"phi": "10deg"}).phi == pytest.approx(np.radians(10))
-    assert as_pose((1, 2, 3)) == Pose(1.0, 2.0, 3.0)
-    assert as_pose({"x": np.float64(0.1) + 0.2}).x == 0.1 + 0.2
+    assert convert_to_pose({"phi": "10deg"}).phi == pytest.approx(np.radians(10))
+    assert convert_to_pose((1, 2, 3)) == Pose(1.0, 2.0, 3.0)
+    assert convert_to_pose({"x": np.float64(0.1) + 0.2}).x == 0.1 + 0.2
 
 
 def test_any_rotation_is_read_from_its_matrix():
@@ -71,7 +71,7 @@ def test_any_rotation_is_read_from_its_matrix():
         R = pin.SE3.Random().rotation if seed else np.diag([1.0, -1.0, -1.0])
         X = np.eye(4)
         X[:3, :3] = R
-        np.testing.assert_allclose(as_pose(X).rotation, R, atol=1e-12)
+        np.testing.assert_allclose(convert_to_pose(X).rotation, R, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -98,7 +98,7 @@ def test_any_rotation_is_read_from_its_matrix():
     ],
 )
 def test_one_pose_and_several_are_told_apart(given, count):
-    assert len(asked_poses(given)) == count
+    assert len(parse_poses(given)) == count
 
 
 REFLECTED = np.diag([1.0, 1.0, -1.0, 1.0])
@@ -235,10 +235,10 @@ def test_help_shows_every_option(name):
 
 def test_options_have_one_name_in_python_and_on_the_command_line():
     from hrsynth.cli import app
-    from hrsynth.index import analyses
+    from hrsynth.index import list_analyses
 
     compared = 0
-    for command in analyses():
+    for command in list_analyses():
         known = inspect.signature(getattr(hrsynth, command)).parameters
         for option in app.commands[command].options:
             if option.name in known and not option.argument:
@@ -365,4 +365,4 @@ class TestExamples:
 
 
 def test_a_mode_is_a_pose_too():
-    assert str(asked_pose("mode:3")) == "mode:3"
+    assert str(parse_pose("mode:3")) == "mode:3"

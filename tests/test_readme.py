@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from hrsynth.cli import execute
+from hrsynth.cli import run_command
 from hrsynth.description import list_robots
 from tables import catalog, closures, observation_kinds, replays, robots
 from tables.markdown import block, line, replace_between
@@ -125,7 +125,7 @@ def test_the_tutorial_of_an_own_file_works(tmp_path: Path, monkeypatch: pytest.M
     Path("arm.urdf").write_text(re.search(r"```xml\n(.*?)```", page, re.DOTALL)[1], encoding="utf-8")
     commands = re.findall(r"^hrsynth (.*)", page, re.MULTILINE)
     assert len(commands) > 8
-    assert [command for command in commands if execute(shlex.split(command))] == []
+    assert [command for command in commands if run_command(shlex.split(command))] == []
 
 
 @pytest.mark.some(1)
@@ -141,7 +141,7 @@ def test_the_commands_print_what_is_shown(
 ):
     """Line by line, with its numbers; a page can omit lines."""
     monkeypatch.chdir(tmp_path)
-    assert execute(shlex.split(command)) == 0
+    assert run_command(shlex.split(command)) == 0
     printed = capsys.readouterr().out.splitlines()
     for shown in re.findall(re.escape(f"$ hrsynth {command}\n") + r"(.*?)\n(?:```|\n?\$ )", SHOWN, re.DOTALL):
         missing = [

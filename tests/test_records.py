@@ -22,9 +22,9 @@ from hrsynth.records import (
     Record,
     Recorded,
     Shown,
-    members,
+    build_type_schema,
+    list_members,
     recorded,
-    schema,
 )
 
 
@@ -87,7 +87,7 @@ def test_a_record_is_what_its_schema_says(p: list[float], largest: float, gap: f
     corner = None if name is None else Corner(gap, name)
     place = Place(np.array(p), Error(largest, gap), corner, name, count)
     parts: dict = {}
-    wanted = {**schema(Place, parts), "$defs": parts}
+    wanted = {**build_type_schema(Place, parts), "$defs": parts}
     told = place.to_dict()
     assert not list(Draft202012Validator(wanted).iter_errors(told))
     assert told["p_mm"] == pytest.approx([1e3 * each for each in p], abs=1e-6)
@@ -102,7 +102,7 @@ def test_a_record_is_what_its_schema_says(p: list[float], largest: float, gap: f
 
 def test_a_schema_says_of_each_member_what_stands_beside_it():
     parts: dict = {}
-    schema(Place, parts)
+    build_type_schema(Place, parts)
     of = parts["Place"]["properties"]
     assert of["p_mm"] == {"type": "array", "items": {"type": "number"}, "description": "point"}
     assert of["is_far"] == {"type": "boolean", "description": "Whether it is far."}
@@ -111,4 +111,4 @@ def test_a_schema_says_of_each_member_what_stands_beside_it():
     assert parts["Place"]["description"] == "Where it is."
     assert parts["Error"]["description"] == "How wrong it is."
     assert {*parts["Place"]["required"]} == {"p_mm", "error_deg", "count", "weight", "names", "is_far"}
-    assert "hidden" not in {each.name for each in members(Place)}
+    assert "hidden" not in {each.name for each in list_members(Place)}

@@ -25,18 +25,18 @@ import pytest
 
 from hrsynth import certificate, modes, untrusted
 from hrsynth import certificates as certificates_
-from hrsynth.budgets import LARGEST_BESIDE, LARGEST_UNPACKED, MOST_UNPACKED
+from hrsynth.budgets import ARCHIVE_FILES_MAX, LARGEST_BESIDE, UNPACKED_MAX_BYTES
 from hrsynth.catalog import query
 from hrsynth.catalog import store as stores
-from hrsynth.catalog.jsonl import head, record
+from hrsynth.catalog.jsonl import format_head, parse_record
 from hrsynth.catalog.store import store
 from hrsynth.certificates import verify, verify_certificate, verify_path, verify_ranks
-from hrsynth.cli import execute
+from hrsynth.cli import run_command
 from hrsynth.description import save
 from hrsynth.description.formats.gepetto import settings
-from hrsynth.description.meshes import locate_mesh, triangles
-from hrsynth.errors import BadRequest, CertificateRefused, HrsynthError
-from hrsynth.mechanism.model import fresh_name
+from hrsynth.description.meshes import locate_mesh, read_robot_meshes
+from hrsynth.errors import BadRequest, HrsynthError, InvalidCertificate
+from hrsynth.mechanism.model import make_fresh_name
 
 ROOT = Path(__file__).resolve().parent.parent
 LINKS = '<link name="base"/><link name="crank">{}</link><link name="bar"/><link name="rocker"/>'
@@ -76,14 +76,14 @@ class Touch:
 
 def test_gzip_is_inflated_up_to_the_limit():
     one = gzip.compress(b"x" * 600)
-    assert untrusted.gunzip(gzip.compress(b"x" * 1000), "f", 1000) == b"x" * 1000
-    assert untrusted.gunzip(one + b"\0" * 8, "f", 1000) == b"x" * 600
+    assert untrusted.unpack_gzip(gzip.compress(b"x" * 1000), "f", 1000) == b"x" * 1000
+    assert untrusted.unpack_gzip(one + b"\0" * 8, "f", 1000) == b"x" * 600
     for bomb in (gzip.compress(b"x" * 1001), one + one, gzip.compress(b"x" * 10**7)):
         with pytest.raises(BadRequest, match="unpacks to: got 'more than 1000 bytes'"):
-            untrusted.gunzip(bomb, "f", 1000)
+            untrusted.unpack_gzip(bomb, "f", 1000)
     for bad in (one[:-9], b"\x1f\x8bno", one + b"rest", gzip.compress(one)[:5]):
         with pytest.raises(BadRequest, match="truncated, or not compressed"):
-            untrusted.gunzip(bad, "f", 1000)
+            untrusted.unpack_gzip(bad, "f", 1000)
 
 
 def archive(*names: str, size: int | None = None) -> bytes:
@@ -103,9 +103,9 @@ def archive(*names: str, size: int | None = None) -> bytes:
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        (archive("a", size=LARGEST_UNPACKED + 1), "unpacks to"),
-        (archive("a", "b", size=LARGEST_UNPACKED // 2 + 1), "unpacks to"),
-        (archive(*map(str, range(MOST_UNPACKED + 1))), "files"),
+        (archive("a", size=UNPACKED_MAX_BYTES + 1), "unpacks to"),
+        (archive("a", "b", size=UNPACKED_MAX_BYTES // 2 + 1), "unpacks to"),
+        (archive(*map(str, range(ARCHIVE_FILES_MAX + 1))), "files"),
         (archive("3D/../../a"), "lead out"),
         (archive("/a"), "lead out"),
         (archive("..\\a"), "lead out"),
@@ -115,7 +115,7 @@ def archive(*names: str, size: int | None = None) -> bytes:
     ],
 )
 def test_archives_are_judged_by_their_lists(content: bytes, said: str | None):
-    found = untrusted.packing_defect(content)
+    found = untrusted.find_packing_defect(content)
     assert (found is None) is (said is None)
     assert said is None or said in str(found)
 
@@ -166,7 +166,7 @@ def bomb_glb(path: Path) -> None:
 def bomb_catalog(folder: Path, line: bytes, count: int) -> None:
     folder.mkdir()
     with gzip.open(folder / "planar.jsonl.gz", "wb", compresslevel=9) as file:
-        file.write(head("planar", count=count).encode() + b"\n")
+        file.write(format_head("planar", count=count).encode() + b"\n")
         for _ in range(count // 100_000):
             file.write(line * 100_000)
 
@@ -232,18 +232,18 @@ def test_a_program_that_reads_has_limits(tmp_path: Path):
     ):
         program.write_text(f"def main():\n    {body}\n")
         if said is None:
-            assert untrusted.output(program, seconds=1) == b"x" * 10**7
+            assert untrusted.run_program(program, seconds=1) == b"x" * 10**7
             continue
         with pytest.raises(BadRequest, match=said):
-            untrusted.output(program, seconds=1)
+            untrusted.run_program(program, seconds=1)
 
 
 @pytest.mark.slow
 def test_it_prints_no_more_than_a_file_may_unpack_to(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(untrusted, "LARGEST_UNPACKED", 10**6)
+    monkeypatch.setattr(untrusted, "UNPACKED_MAX_BYTES", 10**6)
     (tmp_path / "program.py").write_text("def main():\n    print('x' * 10**7)\n")
     with pytest.raises(BadRequest, match="more than 1000000 bytes"):
-        untrusted.output(tmp_path / "program.py", seconds=5)
+        untrusted.run_program(tmp_path / "program.py", seconds=5)
 
 
 # What is read
@@ -350,7 +350,7 @@ def test_meshes_open_no_other_files_and_unpickle_nothing(tmp_path: Path):
     others = sorted(path.name for path in inner.iterdir() if path.name[0] in "aofr")
     names = ["good.obj", "in.gltf", "pipe.obj", *others]
     start = time.monotonic()
-    found = triangles(names, str(inner / "robot.urdf"))
+    found = read_robot_meshes(names, str(inner / "robot.urdf"))
     assert time.monotonic() - start < 2 * SECONDS
     assert [name for name, mesh in found.items() if mesh is not None] == ["good.obj", "in.gltf", "pipe.obj"]
     assert not hit.exists()
@@ -415,7 +415,7 @@ def test_hostile_content_is_one_line_at_every_door(command: str, name: str, what
     folder.mkdir()
     (folder / name).write_bytes(contents(hit)[what])
     places = {"FILE": str(folder / name), "FOLDER": str(folder)}
-    status = execute([places.get(word, word) for word in command.split()])
+    status = run_command([places.get(word, word) for word in command.split()])
     out, err = capsys.readouterr()
     assert status in {"lint": (1, 2), "verify": (2, 3)}.get(command.split()[0], (2,)), err
     assert len(err.splitlines()) <= 1
@@ -433,7 +433,7 @@ def test_names_are_no_code(command: str, tmp_path: Path, capsys, monkeypatch: py
         text = text.replace(f'"{name}"', '"' + CODE.format("hit") + str(number) + '"')
     seen = f'<observe leg="{CODE.format("hit")}" link="{CODE.format("hit")}1" axis="0 0 1"/></hrsynth>'
     (tmp_path / "robot.urdf").write_text(text.replace("</hrsynth>", seen))
-    assert execute([command, "robot.urdf"]) == 0
+    assert run_command([command, "robot.urdf"]) == 0
     assert "__import__" in capsys.readouterr().out
     assert [path.name for path in tmp_path.iterdir()] == ["robot.urdf"]
 
@@ -557,7 +557,7 @@ def test_a_small_certificate_is_checked_soon(what: str, record: dict[str, Any]):
     checker = verify_ranks if record["claim"] == "ranks" else verify_certificate
     record = {"format": "hrsynth-certificate-1", "real": 0, "complex": 0, **record}
     start = time.process_time()
-    with pytest.raises(CertificateRefused, match=r"n < 25|terms|unknowns|rows or columns"):
+    with pytest.raises(InvalidCertificate, match=r"n < 25|terms|unknowns|rows or columns"):
         verify({**record, "sha256": checker.digest(record)})
     assert time.process_time() - start < 5
 
@@ -572,8 +572,8 @@ def test_a_free_name_is_found_without_counting_up_to_it(count: int):
             return super().__contains__(name)
 
     taken = Asked(["a", *(f"a_{number}" for number in range(2, count + 1))])
-    assert fresh_name("a", taken, {}) == f"a_{count + 1}"
-    assert fresh_name("b", taken) == "b"
+    assert make_fresh_name("a", taken, {}) == f"a_{count + 1}"
+    assert make_fresh_name("b", taken) == "b"
     assert Asked.questions < 30
 
 
@@ -585,7 +585,7 @@ def test_of_many_frames_that_nearly_meet_some_are_named(tmp_path: Path):
         )
     file.write_text(f'<robot name="r"><link name="l0"/>{"".join(tree)}</robot>')
     start = time.process_time()
-    assert execute(["check", str(file), "--platform", "l9"]) in (2, 3)
+    assert run_command(["check", str(file), "--platform", "l9"]) in (2, 3)
     assert time.process_time() - start < 20
 
 
@@ -593,17 +593,17 @@ def test_files_beside_a_robot_that_are_large_together_are_not_read(tmp_path: Pat
     file, size = tmp_path / "robot.urdf", LARGEST_BESIDE // 10
     for number in range(12):
         (tmp_path / f"{number}.yaml").write_bytes(bytes(size))
-    assert settings.in_folder(file, ".yaml") == []
+    assert settings.list_folder_files(file, ".yaml") == []
     for number in range(3):
         (tmp_path / f"{number}.yaml").unlink()
-    assert len(settings.in_folder(file, ".yaml")) == 9
+    assert len(settings.list_folder_files(file, ".yaml")) == 9
 
 
 def test_a_certificate_file_is_checked_within_limits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys):
     file, checker = tmp_path / "c.json", tmp_path / "checker.py"
     file.write_text('{"claim": "ranks"}')
     monkeypatch.setattr(verify_ranks, "__file__", str(checker))
-    monkeypatch.setattr(certificates_, "VERIFY_SECONDS", 1)
+    monkeypatch.setattr(certificates_, "VERIFY_TIMEOUT_S", 1)
     for body, status, said in (
         ("while True: pass", 3, "memory or time"),
         ("bytearray(10**10)", 3, "more memory"),
@@ -612,11 +612,11 @@ def test_a_certificate_file_is_checked_within_limits(tmp_path: Path, monkeypatch
     ):
         checker.write_text(f"def main(name):\n    {body}\n")
         monkeypatch.setattr(certificates_.ranks, "describe_ranks", lambda record: "")
-        assert execute(["verify", str(file)]) == status
+        assert run_command(["verify", str(file)]) == status
         (line,) = "".join(capsys.readouterr()).splitlines()
         assert said in line
     file.write_text(" " * (verify_ranks.LENGTH + 1))
-    assert execute(["verify", str(file)]) == 2
+    assert run_command(["verify", str(file)]) == 2
     assert f"up to {verify_ranks.LENGTH}" in capsys.readouterr().err
     for each in (verify_certificate, verify_path, verify_ranks):
         assert each.main(str(file)) == 3
@@ -628,7 +628,7 @@ def test_a_number_too_large_for_a_pose_is_one_line(tmp_path: Path, capsys):
     for value in (10**400, -(10**400), 1e300, True):
         changed = {**record, "at": {**record["at"], "x": value}}
         (tmp_path / "c.json").write_text(json.dumps({**changed, "sha256": verify_certificate.digest(changed)}))
-        assert execute(["verify", str(tmp_path / "c.json"), "--robot", "3rpr_m1"]) == 3
+        assert run_command(["verify", str(tmp_path / "c.json"), "--robot", "3rpr_m1"]) == 3
         (line,) = capsys.readouterr().err.splitlines()
         assert "it is not for 3rpr_m1" in line
 
@@ -644,8 +644,8 @@ def test_a_number_too_large_for_a_pose_is_one_line(tmp_path: Path, capsys):
     ids=["bare", "typed", "deep", "long"],
 )
 def test_a_record_that_is_not_whole_is_one_line(line: str, tmp_path: Path, capsys):
-    (tmp_path / "planar.jsonl").write_text(f"{head('planar', count=1)}\n{line}\n")
-    assert execute(["catalog", "list", "--catalog", str(tmp_path)]) == 2
+    (tmp_path / "planar.jsonl").write_text(f"{format_head('planar', count=1)}\n{line}\n")
+    assert run_command(["catalog", "list", "--catalog", str(tmp_path)]) == 2
     (said,) = capsys.readouterr().err.splitlines()
     assert "record" in said
 
@@ -661,9 +661,9 @@ def test_a_record_that_is_not_whole_is_one_line(line: str, tmp_path: Path, capsy
 )
 def test_a_record_holds_no_lists_of_unknown_size(field: str):
     bare = '{"key":"a","group":"planar","refused":"no"'
-    assert record(bare + ',"x":1}')["x"] == 1
+    assert parse_record(bare + ',"x":1}')["x"] == 1
     with pytest.raises(BadRequest, match="not a catalog entry"):
-        record(f"{bare},{field}}}")
+        parse_record(f"{bare},{field}}}")
 
 
 @pytest.mark.parametrize("ending", ["", ".sqlite"])
@@ -704,7 +704,7 @@ def test_a_database_runs_no_program_and_counts_its_rows(what: str, tmp_path: Pat
     with contextlib.closing(sqlite3.connect(file)) as changed:
         changed.executescript(PROGRAMS[what])
     for arguments in (["list"], ["list", "--json", "--modes", "3"], ["show", "3(Rz*-Rz-Rz)"]):
-        status = execute(["catalog", *arguments, "--catalog", str(file)])
+        status = run_command(["catalog", *arguments, "--catalog", str(file)])
         errors = capsys.readouterr().err
         assert (status, len(errors.splitlines())) == (2, 1), errors
         assert "c.sqlite" in errors
@@ -734,7 +734,7 @@ def test_a_text_of_a_database_is_short(change: str, asked: dict[str, Any], said:
 def test_a_pipe_is_not_waited_for(command: str, tmp_path: Path, capsys):
     for name in ("planar.jsonl", "p.sqlite", "p.json"):
         os.mkfifo(tmp_path / name)
-    assert execute(command.replace("FOLDER", str(tmp_path)).split()) == 2
+    assert run_command(command.replace("FOLDER", str(tmp_path)).split()) == 2
     (said,) = capsys.readouterr().err.splitlines()
     assert "not a regular file" in said
 

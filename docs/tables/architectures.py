@@ -10,7 +10,7 @@ from typing import Any
 
 from hrsynth.analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
 from hrsynth.catalog.architecture_key import ArchitectureKey, LegKey, parse
-from hrsynth.catalog.groups.spatial import translates
+from hrsynth.catalog.groups.spatial import is_translational_leg
 from hrsynth.catalog.query import Catalog
 
 from .markdown import replace_between, table
@@ -70,10 +70,10 @@ def delta_controllable(word: ArchitectureKey, dof: int) -> bool:
 
 
 def translating(word: ArchitectureKey) -> bool:
-    """Return True if all legs of a key translate (:func:`hrsynth.catalog.groups.spatial.translates`)."""
+    """Return True if all legs of a key translate (:func:`hrsynth.catalog.groups.spatial.is_translating`)."""
     joints = [joint for leg in word.legs for joint in leg.joints]
     return all(joint.letter in "RP" and joint.axes in "abhjk" for joint in joints) and all(
-        translates(leg.chain) for leg in word.legs
+        is_translational_leg(leg.chain) for leg in word.legs
     )
 
 

@@ -6,7 +6,7 @@ import tempfile
 from pathlib import Path
 
 from hrsynth import lint, load, save
-from hrsynth.description.formats import writable
+from hrsynth.description.formats import list_writable_formats
 from hrsynth.description.formats.extensions import DRAKE
 from hrsynth.description.formats.urdf.conventions import CONVENTIONS
 from hrsynth.linting.rules.readers import ASKED, CONSTRUCTS, PROGRAMS, READ, REFUSED, SILENT, TOLD
@@ -38,7 +38,7 @@ def table() -> str:
 def written_table() -> str:
     """Return the Markdown table of the formats that are written, and the programs that read their loops."""
     rows = []
-    for form in (each for each in writable() if each.name != "usd"):  # no program of the table reads USD
+    for form in (each for each in list_writable_formats() if each.name != "usd"):  # no program of the table reads USD
         constructs = written_constructs(form.endings[0])
         readers = [each for each in PROGRAMS if all(CONSTRUCTS[name].get(each) == READ for name in constructs)]
         endings, names = (", ".join(f"`{each}`" for each in part) for part in (form.endings, constructs))

@@ -38,7 +38,7 @@ import hrsynth
 
 try:
     hrsynth.check("quattro", at="x=5")
-except hrsynth.errors.PoseNotReached as error:
+except hrsynth.errors.PoseReachFailure as error:
     print(error.exit_status)  # → 3
     print(error.leg is None)  # → False
 ```

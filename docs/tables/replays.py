@@ -68,7 +68,7 @@ def row(replay: Replay) -> tuple[str, ...]:
         metres, radians = _error(replay)
         turns = found.setup.motion.rotations.shape[1]
         here += f" ± {1e3 * metres:.2g} mm" + (f", {radians:.1g} rad" if turns else "")
-        if s.aside:
+        if s.has_bias:
             here += f", about {_place(Pose(*s.mean))}"
     else:
         here += f" {_place(found.pose)}"

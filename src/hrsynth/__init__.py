@@ -11,11 +11,11 @@
 A result is one line at a prompt; ``print`` shows it in full, ``to_dict()`` is its JSON, ``hrsynth.draw`` its figure.
 """
 
-from .index import homes
+from .index import list_public_modules
 from .results import Result
 from .version import __version__ as __version__
 
-__all__ = sorted([*homes(), "__version__", "catalog"])
+__all__ = sorted([*list_public_modules(), "__version__", "catalog"])
 
 
 def __getattr__(name: str) -> object:
@@ -24,9 +24,11 @@ def __getattr__(name: str) -> object:
 
     if name == "catalog":
         return import_module(".catalog", __name__)
-    if name not in homes():
+    if name not in list_public_modules():
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value: object = globals().setdefault(name, getattr(import_module(f".{homes()[name]}", __name__), name))
+    value: object = globals().setdefault(
+        name, getattr(import_module(f".{list_public_modules()[name]}", __name__), name)
+    )
     return value
 
 

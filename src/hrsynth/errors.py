@@ -22,7 +22,7 @@ class HrsynthError(Exception):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the message instead of the constructor arguments, so that workers can return errors."""
-        return _error, (type(self), self.args), self.__dict__
+        return _restore_error, (type(self), self.args), self.__dict__
 
     def lines(self) -> list[str]:
         """Return one line per defect, without the program's name."""
@@ -30,7 +30,7 @@ class HrsynthError(Exception):
         return [text if self.file is None else f"{self.file}: {text}"]
 
 
-def _error(kind: type[HrsynthError], args: tuple[Any, ...]) -> HrsynthError:
+def _restore_error(kind: type[HrsynthError], args: tuple[Any, ...]) -> HrsynthError:
     """Make an error of a class without calling its constructor."""
     return kind.__new__(kind, *args)
 
@@ -162,7 +162,7 @@ class NoResult(HrsynthError):
         super().__init__(compose_message(problem, None, None, remedy))
 
 
-class LoopsNotClosed(NoResult):
+class LoopClosureFailure(NoResult):
     """Open kinematic loops: the remaining closure residual and the loop with the largest one."""
 
     def __init__(self, robot: str, residual: float, tolerance: float, loop: str, cure: str = "") -> None:
@@ -187,7 +187,7 @@ class MotorsNotEnough(NoResult):
         )
 
 
-class RankUndecided(NoResult):
+class UndecidedRank(NoResult):
     """Rank with a gap too small for a verdict."""
 
     def __init__(self, what: str, gap: float, needed: float) -> None:
@@ -195,7 +195,7 @@ class RankUndecided(NoResult):
         super().__init__(f"{what}: rank undecided: gap {gap:.3g}, needed {needed:.3g}", "Give more decimals.")
 
 
-class RankBelowRounding(RankUndecided):
+class RoundingLimitedRank(UndecidedRank):
     """Loop constraints as weak as the closure residual: with exact numbers the loops may move that way."""
 
     def __init__(self, robot: str, directions: int, open_by: float) -> None:
@@ -208,7 +208,7 @@ class RankBelowRounding(RankUndecided):
         )
 
 
-class StructureUndecided(NoResult):
+class UndecidedStructure(NoResult):
     """Rounded numbers that fit two structures equally well."""
 
     def __init__(self, robot: str, tolerance: float, one: str, other: str) -> None:
@@ -220,7 +220,7 @@ class StructureUndecided(NoResult):
         )
 
 
-class NotSampled(NoResult):
+class SamplingFailure(NoResult):
     """Too few samples reached from the zero configuration in a number of random walks (``tries``)."""
 
     def __init__(self, robot: str, reached: int, wanted: int, tries: int) -> None:
@@ -269,7 +269,7 @@ class GeometryAmbiguous(NoResult):
         )
 
 
-class NothingProved(NoResult):
+class NoProvedCell(NoResult):
     """Branch without a proved cell, so that no code can be generated, and the reason."""
 
     def __init__(self, robot: str, motors: Iterable[str], reason: str) -> None:
@@ -289,7 +289,7 @@ class LegMiss(NamedTuple):
     at_least: bool = False
 
 
-class PoseNotReached(NoResult):
+class PoseReachFailure(NoResult):
     """Pose that the robot does not reach from ``origin``: the leg with the largest distance to it (mm, degrees), or
     None if each leg alone reaches it; the part of the path travelled (``came``, 0 to 1) and the last pose; a joint near
     its tilt limit there (``wrist``); the reason why the legs together fail (``why``), or another ``reason``."""
@@ -311,7 +311,7 @@ class PoseNotReached(NoResult):
         self.millimetres = 0.0 if miss is None else 1e3 * miss.length
         self.degrees = 0.0 if miss is None else math.degrees(miss.angle)
         self.wrist = wrist
-        self.others: tuple[PoseNotReached, ...] = ()
+        self.others: tuple[PoseReachFailure, ...] = ()
         if reason is None:
             if wrist is not None:
                 reason = f"joint {wrist}, which replaces several R through one point, is near its tilt limit"
@@ -333,7 +333,7 @@ class PoseNotReached(NoResult):
         super().__init__(f"{robot}: the pose {pose} is not reached: {self.reason}", "Choose a nearer pose.")
 
     @classmethod
-    def of_all(cls, refused: Sequence[PoseNotReached]) -> PoseNotReached:
+    def of_all(cls, refused: Sequence[PoseReachFailure]) -> PoseReachFailure:
         """Return the first of several poses that are not reached; it reports one line for each."""
         refused[0].others = tuple(refused[1:])
         return refused[0]
@@ -371,7 +371,7 @@ class UnsupportedLocus(NoResult):
         super().__init__(f"{robot}: assembly modes cannot be listed: {reason}", "Observe other legs.")
 
 
-class NotConfirmed(NoResult):
+class ConfirmationFailure(NoResult):
     """Architecture without an exact verdict that samples confirm, and the reason."""
 
     def __init__(self, robot: str, what: str) -> None:
@@ -399,7 +399,7 @@ class NoCertificate(NoResult):
         super().__init__(f"{robot}: no certificate: {reason}", "Omit --certificate.")
 
 
-class CertificateRefused(NoResult):
+class InvalidCertificate(NoResult):
     """Certificate that the checker does not accept, and the reason."""
 
     def __init__(self, source: str, reason: str) -> None:
@@ -422,7 +422,7 @@ class MissingExtra(NoResult):
         super().__init__(self.reason)
 
 
-class SystemNotSolved(NoResult):
+class ExternalSolverFailure(NoResult):
     """Solver without a result, and the reason."""
 
     def __init__(self, solver: str, reason: str) -> None:
@@ -439,7 +439,7 @@ class TooLarge(NoResult):
         super().__init__(self.reason, "Raise --time-limit.")
 
 
-class NotRendered(NoResult):
+class RenderFailure(NoResult):
     """Images that cannot be rendered on this machine, and the reason."""
 
     def __init__(self, reason: str) -> None:
@@ -463,7 +463,7 @@ class WorkersLost(NoResult):
         super().__init__(f"{reason}, perhaps for lack of memory", "Use fewer processes (--jobs).")
 
 
-class BuildStopped(NoResult):
+class BuildInterruption(NoResult):
     """Build of the catalog, or sweep to a file, that cannot continue: the reason, and the journal of finished work."""
 
     def __init__(self, reason: str, kept: str | None = None, what: str = "build") -> None:

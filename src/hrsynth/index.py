@@ -34,7 +34,7 @@ HELPERS = {
 
 
 @cache
-def analyses() -> dict[str, dict[str, Any]]:
+def list_analyses() -> dict[str, dict[str, Any]]:
     """Return the declaration of each analysis by name, in the order of lists."""
     if not PACKAGE.is_dir():  # in an archive, which the command line refuses
         return {}
@@ -43,18 +43,18 @@ def analyses() -> dict[str, dict[str, Any]]:
 
 
 @cache
-def homes() -> dict[str, str]:
+def list_public_modules() -> dict[str, str]:
     """Return the module of each public function, below the package."""
     helpers = {name: module for module, names in HELPERS.items() for name in names}
-    return helpers | {name: each["module"] for name, each in analyses().items()}
+    return helpers | {name: each["module"] for name, each in list_analyses().items()}
 
 
-def options(name: str) -> list[Option]:
+def list_analysis_options(name: str) -> list[Option]:
     """Return the options of an analysis."""
-    return [_read(each) for each in analyses()[name]["options"]]
+    return [_read(each) for each in list_analyses()[name]["options"]]
 
 
-def _told(option: Option) -> dict[str, Any]:
+def _describe_option(option: Option) -> dict[str, Any]:
     """Encode an option for the index: the fields that differ from the defaults."""
     default = {each.name: each.default for each in fields(Option)}
     told = {name: value for name, value in asdict(option).items() if value != default[name]}
@@ -72,7 +72,7 @@ def _read(told: dict[str, Any]) -> Option:
     return Option(**given)
 
 
-def declared() -> dict[str, dict[str, Any]]:
+def collect_declared() -> dict[str, dict[str, Any]]:
     """Collect the declarations from the modules, all of which are loaded."""
     found: dict[int, tuple[str, dict[str, Any]]] = {}
     for path in sorted(PACKAGE.rglob("*.py")):
@@ -89,21 +89,21 @@ def declared() -> dict[str, dict[str, Any]]:
                         "help": declaration.help,
                         "seeded": declaration.seeded,
                         "examples": list(declaration.examples),
-                        "options": [_told(each) for each in declaration.options],
+                        "options": [_describe_option(each) for each in declaration.options],
                     },
                 )
     return dict(found[place] for place in sorted(found))
 
 
-def index_text() -> str:
+def format_index() -> str:
     """Return the content of ``index.json``."""
-    rows = [f'"{name}": {json.dumps(each, ensure_ascii=False)}' for name, each in declared().items()]
+    rows = [f'"{name}": {json.dumps(each, ensure_ascii=False)}' for name, each in collect_declared().items()]
     return "{\n" + ",\n".join(rows) + "\n}\n"
 
 
-def stub_text() -> str:
+def format_stub() -> str:
     """Return the content of ``__init__.pyi``: public functions with types, for editors and type checkers."""
-    places = homes()
+    places = list_public_modules()
     lines = ['"""Made by make index."""', "", "from . import catalog as catalog"]
     lines += [
         f"from .{place} import {name} as {name}" for place, name in sorted((places[name], name) for name in places)
@@ -114,7 +114,7 @@ def stub_text() -> str:
 
 def write() -> None:
     """Write both files."""
-    INDEX.write_text(index_text(), encoding="utf-8")
-    analyses.cache_clear()
-    homes.cache_clear()
-    STUB.write_text(stub_text(), encoding="utf-8")
+    INDEX.write_text(format_index(), encoding="utf-8")
+    list_analyses.cache_clear()
+    list_public_modules.cache_clear()
+    STUB.write_text(format_stub(), encoding="utf-8")

@@ -65,12 +65,12 @@ class Option:
         return f"{self.help}  [{'; '.join(facts)}]" if facts else self.help
 
     @property
-    def several(self) -> bool:
+    def is_repeatable(self) -> bool:
         """True if it can be given more than once."""
         return self.kind == list[str]
 
     @property
-    def names_several(self) -> bool:
+    def has_several_names(self) -> bool:
         """True if one value is a list of names; repeating the option is then an error."""
         return self.metavar in ("LEGS", "LINKS", "JOINTS")
 
@@ -80,22 +80,22 @@ class Option:
             return []
         if self.kind is bool:
             return [self.names[0].partition("/")[0]] if value else []
-        each = value if self.several and not isinstance(value, str) else [value]
-        return [word for part in each for word in (self.names[0], as_typed(part))]
+        each = value if self.is_repeatable and not isinstance(value, str) else [value]
+        return [word for part in each for word in (self.names[0], format_typed(part))]
 
     def read(self, text: str) -> Any:
         """Convert the text of a value; raises ``BadRequest``."""
         if self.kind not in (int, float):
             return text
         try:
-            number = plain_number(text, self.kind)
-            if in_range(number, self.low, self.high):
+            number = parse_plain_number(text, self.kind)
+            if is_in_range(number, self.low, self.high):
                 return number
         except ValueError:
             pass
         name = self.names[0] if self.names else self.value
         word = "an integer" if self.kind is int else "a number"
-        raise BadRequest(name, text, ", ".join([word, *range_words(self.low, self.high)])) from None
+        raise BadRequest(name, text, ", ".join([word, *describe_range(self.low, self.high)])) from None
 
 
 def flag(name: str, help: str, group: str = OWN) -> Option:
@@ -108,7 +108,7 @@ def output(help: str, metavar: str = "FILE", default: Any = None) -> Option:
     return Option("output", help, metavar, default=default, flags=("-o", "--output"), group=OUTPUT)
 
 
-def as_typed(value: Any) -> str:
+def format_typed(value: Any) -> str:
     """Return the text of a value; several names are joined by commas."""
     return ",".join(map(str, value)) if isinstance(value, tuple | list) else str(value)
 
@@ -118,29 +118,29 @@ def option(help: str, metavar: str | None = None, **more: Any) -> Option:
     return Option("", help, metavar, **more)
 
 
-def options_of(function: Callable[..., Any]) -> Iterator[Option]:
+def list_options(function: Callable[..., Any]) -> Iterator[Option]:
     """Yield the options of a function's parameters, or of a dataclass's fields, in order."""
     place = vars(sys.modules[function.__module__])
     for name, parameter in signature(function).parameters.items():
-        hint, *extras = _annotated(parameter.annotation, place)
+        hint, *extras = _split_annotation(parameter.annotation, place)
         for each in [each for each in extras if isinstance(each, Option)][-1:]:
             default = NEEDED if parameter.default is Parameter.empty else parameter.default
-            kind = _kind(hint) if each.kind is str else each.kind
+            kind = _choose_kind(hint) if each.kind is str else each.kind
             yield replace(each, name=name, kind=kind, default=None if default == () else default)
 
 
-def kinds_of(function: Callable[..., Any]) -> dict[str, list[str]]:
+def list_parameter_types(function: Callable[..., Any]) -> dict[str, list[str]]:
     """Return the types of a function's parameters by name: ``["int", "None"]``."""
     place = vars(sys.modules[function.__module__])
     found = {}
     for name, parameter in signature(function).parameters.items():
-        hint, *_ = _annotated(parameter.annotation, place)
+        hint, *_ = _split_annotation(parameter.annotation, place)
         parts = hint.split(" | ") if isinstance(hint, str) else get_args(hint) or (hint,)
         found[name] = ["None" if each is NoneType else getattr(each, "__name__", str(each)) for each in parts]
     return found
 
 
-def plain_signature(function: Callable[..., Any]) -> Signature:
+def strip_annotations(function: Callable[..., Any]) -> Signature:
     """Return a function's signature without annotations beyond types."""
     known = signature(function)
     plain = [
@@ -152,7 +152,7 @@ def plain_signature(function: Callable[..., Any]) -> Signature:
     return known.replace(parameters=plain)
 
 
-def _annotated(annotation: Any, place: dict[str, Any]) -> tuple[Any, ...]:
+def _split_annotation(annotation: Any, place: dict[str, Any]) -> tuple[Any, ...]:
     """Return a type and its annotations; plain types are not resolved."""
     if isinstance(annotation, str):
         if not annotation.startswith("Annotated[") and get_origin(place.get(annotation)) is not Annotated:
@@ -161,29 +161,29 @@ def _annotated(annotation: Any, place: dict[str, Any]) -> tuple[Any, ...]:
     return get_args(annotation) if get_origin(annotation) is Annotated else (annotation,)
 
 
-def _kind(hint: Any) -> Any:
+def _choose_kind(hint: Any) -> Any:
     """Return the kind of an option: number or flag, perhaps with None, otherwise text."""
     kinds = {each for each in get_args(hint) or (hint,) if each is not NoneType}
     return kinds.pop() if kinds in ({bool}, {int}, {float}) else str
 
 
-def range_words(low: float | None, high: float | None) -> list[str]:
+def describe_range(low: float | None, high: float | None) -> list[str]:
     """Return a range in words."""
     return [f"at {end} {value:g}" for end, value in (("least", low), ("most", high)) if value is not None]
 
 
-def in_range(value: float, low: float | None, high: float | None) -> bool:
+def is_in_range(value: float, low: float | None, high: float | None) -> bool:
     """Return True if a number is in a range; NaN is in no bounded range."""
     return (low is None or value >= low) and (high is None or value <= high)
 
 
 def require_range(name: str, value: float, word: str, low: float | None, high: float | None = None) -> None:
     """Raise ``BadRequest`` for a value outside of a range."""
-    if not in_range(value, low, high):
-        raise BadRequest(name, value, ", ".join([word, *range_words(low, high)]))
+    if not is_in_range(value, low, high):
+        raise BadRequest(name, value, ", ".join([word, *describe_range(low, high)]))
 
 
-def plain_number(text: str, kind: type = float) -> Any:
+def parse_plain_number(text: str, kind: type = float) -> Any:
     """Convert a number in ASCII digits without underscores; raises ``ValueError``."""
     if not text.isascii() or "_" in text:
         raise ValueError(text)

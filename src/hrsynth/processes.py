@@ -13,7 +13,7 @@ from typing import TypeVar
 
 from .errors import NeedsPosix, WorkersLost
 
-PARENT_WATCH = 0.5
+PARENT_CHECK_INTERVAL_S = 0.5
 """Interval at which a worker checks that its parent is alive (s)."""
 T = TypeVar("T")
 
@@ -64,10 +64,10 @@ def run_shared(works: Iterable[Callable[[], T]], jobs: int, *, ordered: bool = T
 def _end_with_parent(parent: int) -> None:
     """End this process with its parent, which alone handles Ctrl-C."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    Thread(target=_watch, args=(parent,), daemon=True).start()
+    Thread(target=_stop_with_parent, args=(parent,), daemon=True).start()
 
 
-def _watch(parent: int) -> None:
+def _stop_with_parent(parent: int) -> None:
     while os.getppid() == parent:
-        time.sleep(PARENT_WATCH)
+        time.sleep(PARENT_CHECK_INTERVAL_S)
     os._exit(1)

@@ -18,7 +18,7 @@ def report(stage: str) -> None:
 
 
 @contextmanager
-def part(name: str) -> Iterator[None]:
+def report_part(name: str) -> Iterator[None]:
     """Prefix stages reported within by the name of a part, as ``set 3 of 20: modes``."""
     token = _part.set(f"{_part.get()}{name}: ")
     try:

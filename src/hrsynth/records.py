@@ -96,12 +96,12 @@ class Record:
 
     def to_dict(self) -> Json:
         """Return the members by name for JSON; null if not finite."""
-        return _members_of(self)
+        return _collect_members(self)
 
     def to_row(self) -> dict[str, Any]:
         """Return the members in one level, for a table row (``pandas.DataFrame([found.to_row(), ...])``); nested names
         are joined by dots."""
-        return dict(_flat(self.to_dict()))
+        return dict(_expand_fields(self.to_dict()))
 
 
 class Shown:
@@ -146,12 +146,12 @@ class OfRobot(Head):
     platform: Platform
 
 
-def _members_of(value: Any, scale: float | None = None) -> dict[str, Any]:
+def _collect_members(value: Any, scale: float | None = None) -> dict[str, Any]:
     """Return the members of a record or a named tuple."""
     found: dict[str, Any] = {}
-    for member in members(type(value)):  # type: ignore[arg-type]
+    for member in list_members(type(value)):  # type: ignore[arg-type]
         how = replace(member.how, scale=scale) if member.how.scaled else member.how
-        part = plain(getattr(value, member.attribute), how)
+        part = convert_to_json(getattr(value, member.attribute), how)
         if member.how.flat:
             found |= {name: each for name, each in (part or {}).items() if name not in member.how.without}
         elif part is not None or not member.how.optional:
@@ -159,16 +159,16 @@ def _members_of(value: Any, scale: float | None = None) -> dict[str, Any]:
     return found
 
 
-def plain(value: Any, how: As = As()) -> Any:
+def convert_to_json(value: Any, how: As = As()) -> Any:
     """Convert a value for JSON."""
     if value is None or isinstance(value, bool | str):
         return value
     if hasattr(value, "to_dict"):
-        return value.to_dict() if how.scale is None else _members_of(value, how.scale)
+        return value.to_dict() if how.scale is None else _collect_members(value, how.scale)
     if isinstance(value, Mapping):
-        return {name: plain(each, how) for name, each in value.items()}
+        return {name: convert_to_json(each, how) for name, each in value.items()}
     if hasattr(value, "_fields"):
-        return _members_of(value)
+        return _collect_members(value)
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, float):
@@ -176,24 +176,24 @@ def plain(value: Any, how: As = As()) -> Any:
         value = value if how.digits is None else round(value, how.digits) + 0.0
         return value if isfinite(value) else None
     if isinstance(value, tuple | list):
-        return [plain(each, how) for each in value]
+        return [convert_to_json(each, how) for each in value]
     return str(value) if isinstance(value, PurePath) else value
 
 
-def _flat(fields: Mapping[str, Any], at: str = "") -> Iterator[tuple[str, Any]]:
+def _expand_fields(fields: Mapping[str, Any], at: str = "") -> Iterator[tuple[str, Any]]:
     for name, value in fields.items():
         if isinstance(value, Mapping):
-            yield from _flat(value, f"{at}{name}.")
+            yield from _expand_fields(value, f"{at}{name}.")
         else:
             yield f"{at}{name}", value
 
 
 @cache
-def members(kind: type) -> tuple[Member, ...]:
+def list_members(kind: type) -> tuple[Member, ...]:
     """Return the members of a class of records, those of its bases first."""
     if is_typeddict(kind):
         hints = get_type_hints(kind, include_extras=True)
-        every = [_member(name, hint) for name, hint in hints.items()]
+        every = [_build_member(name, hint) for name, hint in hints.items()]
         return tuple(each if kind.__total__ else replace(each, how=OPTIONAL) for each in every)  # type: ignore[attr-defined]
     found: dict[str, Member] = {}
     for base in reversed(kind.__mro__):
@@ -202,19 +202,19 @@ def members(kind: type) -> tuple[Member, ...]:
         told = {
             name: hint for name, hint in known.items() if named or str(hint).startswith(("Annotated[", "Recorded["))
         }
-        found |= {name: _member(name, hint) for name, hint in resolve_hints(told, base.__module__).items()}
+        found |= {name: _build_member(name, hint) for name, hint in resolve_hints(told, base.__module__).items()}
         for name, value in vars(base).items():
             if isinstance(value, Shown):
-                found[name] = _member(name, Annotated[(value.kind, "", *value.extras)])
+                found[name] = _build_member(name, Annotated[(value.kind, "", *value.extras)])
                 continue
             function: Any = getattr(value, "fget", getattr(value, "func", None))
             if isinstance(value, property | cached_property) and hasattr(function, "recorded"):
                 hint = get_type_hints(function, include_extras=True)["return"]
-                found[name] = _member(name, Annotated[(hint, "", *function.recorded)], function.__doc__ or "")
+                found[name] = _build_member(name, Annotated[(hint, "", *function.recorded)], function.__doc__ or "")
     return tuple(found.values())
 
 
-def _member(attribute: str, hint: Any, doc: str = "") -> Member:
+def _build_member(attribute: str, hint: Any, doc: str = "") -> Member:
     """Read a member from an annotation."""
     how = OPTIONAL if get_origin(hint) is NotRequired else As()
     if get_origin(hint) is NotRequired:
@@ -231,7 +231,7 @@ def _member(attribute: str, hint: Any, doc: str = "") -> Member:
     return Member(how.name or attribute, attribute, kind, how, words)
 
 
-def schema(kind: Any, parts: dict[str, Any]) -> dict[str, Any]:
+def build_type_schema(kind: Any, parts: dict[str, Any]) -> dict[str, Any]:
     """Return the JSON schema of a type; add the classes it contains to ``parts``."""
     if kind is Any:
         return {}
@@ -239,43 +239,43 @@ def schema(kind: Any, parts: dict[str, Any]) -> dict[str, Any]:
         return {"type": SIMPLE[kind]}
     origin, values = get_origin(kind), get_args(kind)
     if origin is Annotated:
-        member = _member("", kind)
-        return {**schema(member.kind, parts), "description": member.words}
+        member = _build_member("", kind)
+        return {**build_type_schema(member.kind, parts), "description": member.words}
     if origin is Literal:
         return {"enum": list(values)}
     if origin in (Union, UnionType):
-        return {"anyOf": [schema(each, parts) for each in values]}
+        return {"anyOf": [build_type_schema(each, parts) for each in values]}
     if origin in (list, tuple, Sequence):
-        return {"type": "array", "items": schema(values[0], parts)}
+        return {"type": "array", "items": build_type_schema(values[0], parts)}
     if origin in (dict, Mapping):
-        return {"type": "object", "additionalProperties": schema(values[1], parts)}
-    if recorded_type(kind) is not kind:
-        return schema(recorded_type(kind), parts)
+        return {"type": "object", "additionalProperties": build_type_schema(values[1], parts)}
+    if find_recorded_type(kind) is not kind:
+        return build_type_schema(find_recorded_type(kind), parts)
     if kind.__name__ not in parts:
         parts[kind.__name__] = {}
-        parts[kind.__name__] = {"description": summary(kind), **object_schema([kind], parts)}
+        parts[kind.__name__] = {"description": read_summary(kind), **build_object_schema([kind], parts)}
     return {"$ref": f"#/$defs/{kind.__name__}"}
 
 
-def object_schema(kinds: Sequence[Any], parts: dict[str, Any]) -> dict[str, Any]:
+def build_object_schema(kinds: Sequence[Any], parts: dict[str, Any]) -> dict[str, Any]:
     """Return the JSON schema of an object with the members of several classes."""
     properties: dict[str, Any] = {}
     required: set[str] = set()
     for kind in kinds:
-        for member in members(recorded_type(kind)):
+        for member in list_members(find_recorded_type(kind)):
             if not member.how.flat:
                 told = {"description": member.words} if member.words else {}
-                properties[member.name] = {**schema(member.kind, parts), **told}
+                properties[member.name] = {**build_type_schema(member.kind, parts), **told}
                 required |= set() if member.how.optional else {member.name}
                 continue
             several = [each for each in get_args(member.kind) or (member.kind,) if each is not NoneType]
-            inner = object_schema(several, parts)
+            inner = build_object_schema(several, parts)
             properties |= {name: each for name, each in inner["properties"].items() if name not in member.how.without}
             required |= set() if NoneType in get_args(member.kind) else {*inner["required"]} - {*member.how.without}
     return {"type": "object", "properties": properties, "required": sorted(required), "additionalProperties": False}
 
 
-def summary(kind: type) -> str:
+def read_summary(kind: type) -> str:
     """Return the first clause of a class's docstring, before its fields."""
     return re.split(r"\.(?:\s|$)|[;:,] ``", " ".join((kind.__doc__ or "").split()), maxsplit=1)[0] + "."
 
@@ -290,7 +290,7 @@ def resolve_hints(annotations: Mapping[str, Any], module: str) -> dict[str, Any]
     return get_type_hints(SimpleNamespace(__annotations__=annotations), vars(sys.modules[module]), include_extras=True)
 
 
-def recorded_type(kind: Any) -> Any:
+def find_recorded_type(kind: Any) -> Any:
     """Return the class whose members are recorded: the class itself, or the return type of its own ``to_dict``."""
     own = getattr(kind, "to_dict", Record.to_dict)
     return kind if own is Record.to_dict else get_type_hints(own)["return"]

@@ -18,11 +18,11 @@ LONGEST_LINE, LONGEST_PART = 160, 48
 P = ParamSpec("P")
 R = TypeVar("R")
 V = TypeVar("V", bound="Value")
-LISTED = 3
+TUPLE_MEMBERS_PRINTED_MAX = 3
 """Largest number of tuple members that are shown; of longer tuples only the number."""
 
 
-def finite(value: float | None) -> float | None:
+def drop_infinite(value: float | None) -> float | None:
     """Return a number for JSON: None if it is undefined or infinite."""
     return None if value is None or not isfinite(value) else float(value)
 
@@ -33,7 +33,7 @@ class Value(Record):
 
     def __repr__(self) -> str:
         own = [field for field in fields(self) if field.repr]  # type: ignore[arg-type]
-        parts = (f"{field.name}={brief(getattr(self, field.name))}" for field in own)
+        parts = (f"{field.name}={shorten_value(getattr(self, field.name))}" for field in own)
         return shorten_text(f"{type(self).__name__}({', '.join(parts)})", LONGEST_LINE)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -47,9 +47,9 @@ class Value(Record):
             object.__setattr__(self, name, value)
 
 
-def brief(value: Any) -> str:
+def shorten_value(value: Any) -> str:
     """Return a value in a few characters: of arrays the shape, of long tuples the number of members."""
-    if isinstance(value, Mapping | tuple | list) and len(value) > LISTED:
+    if isinstance(value, Mapping | tuple | list) and len(value) > TUPLE_MEMBERS_PRINTED_MAX:
         first = next(iter(value.values() if isinstance(value, Mapping) else value))
         return f"<{len(value)} × {type(first).__name__}>"
     if hasattr(value, "shape") and value.shape:
@@ -57,18 +57,18 @@ def brief(value: Any) -> str:
     return shorten_text(f"{value:.6g}" if isinstance(value, float) else repr(value), LONGEST_PART)
 
 
-def content(value: Any) -> Any:
+def freeze_content(value: Any) -> Any:
     """Return the content of a value for comparison and hashing: arrays as tuples, dataclasses as compared fields."""
     if isinstance(value, Mapping):
-        return tuple((key, content(each)) for key, each in value.items())
+        return tuple((key, freeze_content(each)) for key, each in value.items())
     if isinstance(value, tuple | list):
-        return tuple(map(content, value))
+        return tuple(map(freeze_content, value))
     if is_dataclass(value):
-        return type(value), *(content(getattr(value, field.name)) for field in fields(value) if field.compare)
-    return content(value.tolist()) if hasattr(value, "tolist") else value
+        return type(value), *(freeze_content(getattr(value, field.name)) for field in fields(value) if field.compare)
+    return freeze_content(value.tolist()) if hasattr(value, "tolist") else value
 
 
-class Compared(Value):
+class ComparableValue(Value):
     """Value (dataclass with ``eq=False``) that compares by content; a verdict also equals its label:
     ``found.verdict == "controllable"``."""
 
@@ -79,7 +79,7 @@ class Compared(Value):
 
     def said(self) -> Any:
         """Return the content that is compared."""
-        return content(self)
+        return freeze_content(self)
 
     def __eq__(self, other: object) -> bool:
         if isinstance(other, str):
@@ -92,7 +92,7 @@ class Compared(Value):
         return hash(type(self).__name__ if self.word is None else self.word)
 
 
-class Result(Compared):
+class Result(ComparableValue):
     """Result of an analysis.
 
     ``repr`` is one line, ``str`` the text of the command line, and a notebook shows the same as HTML. Two results are

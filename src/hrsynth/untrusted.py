@@ -13,7 +13,7 @@ import zipfile
 import zlib
 from pathlib import Path
 
-from .budgets import LARGEST_UNPACKED, MOST_UNPACKED, PROCESS_BYTES
+from .budgets import ARCHIVE_FILES_MAX, PROCESS_BYTES, UNPACKED_MAX_BYTES
 from .errors import BadRequest
 
 START = "import sys, json; sys.path[:] = json.loads(sys.argv[1]); from {} import start; start(*sys.argv[2:])"
@@ -21,7 +21,7 @@ REFUSED = "refused: "
 """Start of a line by which such a program refuses its input."""
 
 
-def gunzip(content: bytes, file: object, most: int) -> bytes:
+def unpack_gzip(content: bytes, file: object, most: int) -> bytes:
     """Unpack gzip; raises ``BadRequest`` for other, truncated or too much content."""
     parts, size = [], 0
     try:
@@ -39,7 +39,7 @@ def gunzip(content: bytes, file: object, most: int) -> bytes:
     return b"".join(parts)
 
 
-def packing_defect(content: bytes) -> str | None:
+def find_packing_defect(content: bytes) -> str | None:
     """Return the defect of a zip archive by its list of files, before unpacking; None for other content."""
     if not content.startswith(b"PK"):
         return None
@@ -48,10 +48,10 @@ def packing_defect(content: bytes) -> str | None:
     except (zipfile.BadZipFile, ValueError, NotImplementedError, OSError):
         return "a zip archive that cannot be read"
     size = sum(each.file_size for each in files)
-    if len(files) > MOST_UNPACKED:
-        return f"an archive of {len(files)} files, more than {MOST_UNPACKED}"
-    if size > LARGEST_UNPACKED:
-        return f"an archive that unpacks to {size} bytes, more than {LARGEST_UNPACKED}"
+    if len(files) > ARCHIVE_FILES_MAX:
+        return f"an archive of {len(files)} files, more than {ARCHIVE_FILES_MAX}"
+    if size > UNPACKED_MAX_BYTES:
+        return f"an archive that unpacks to {size} bytes, more than {UNPACKED_MAX_BYTES}"
     names = [each.filename.replace("\\", "/") for each in files]
     if any(name.startswith("/") or ".." in name.split("/") for name in names):
         return "an archive with names that lead out of it"
@@ -64,7 +64,7 @@ def refuse(what: str) -> None:
     os._exit(2)
 
 
-def output(program: Path, *arguments: str, seconds: int, given: str = "") -> bytes:
+def run_program(program: Path, *arguments: str, seconds: int, given: str = "") -> bytes:
     """Return the output of a program's ``main``, run in a process of limited time, memory and output; ``given``: its
     standard input. Raises ``BadRequest`` if it refuses its input or does not finish."""
     command = [
@@ -75,7 +75,7 @@ def output(program: Path, *arguments: str, seconds: int, given: str = "") -> byt
         json.dumps(sys.path),
         str(program),
         str(seconds),
-        str(LARGEST_UNPACKED),
+        str(UNPACKED_MAX_BYTES),
         *arguments,
     ]
     own = {key: value for key, value in os.environ.items() if key != "PXR_AR_DEFAULT_SEARCH_PATH"}
@@ -89,7 +89,7 @@ def output(program: Path, *arguments: str, seconds: int, given: str = "") -> byt
             if run.returncode == 0:
                 return told.read()
             errors.seek(0)
-            lines = errors.read(LARGEST_UNPACKED).decode("utf-8", "replace").splitlines()
+            lines = errors.read(UNPACKED_MAX_BYTES).decode("utf-8", "replace").splitlines()
     except (subprocess.TimeoutExpired, ValueError):
         raise BadRequest(f"not read within {seconds} s", remedy="Use a smaller file.") from None
     except OSError as error:

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hrsynth.geometry.so3 import exponential, logarithm
+from hrsynth.geometry.so3 import convert_rotations_to_vectors, convert_vectors_to_rotations
 from hrsynth.geometry.vectors import Array, cross
-from hrsynth.tolerances import SOLVED
+from hrsynth.tolerances import CLOSURE_SOLVER_TOL
 
 from .limits import DAMPED, FAR, LONGEST_STEP, STEPS, STIFF
 from .motions import TURN, TX, LegFactor, dimensions
@@ -167,9 +167,9 @@ def close(
     for _ in range(STEPS):
         p, R, of_joints, of_lengths = forward(part, at)
         leg_R, leg_p = np.repeat(at.R, n // poses, axis=1), np.repeat(at.p, n // poses, axis=1)
-        error = np.concatenate([p - leg_p, logarithm(R @ np.swapaxes(leg_R, -1, -2))], axis=-1)
+        error = np.concatenate([p - leg_p, convert_rotations_to_vectors(R @ np.swapaxes(leg_R, -1, -2))], axis=-1)
         size = np.abs(error).max(axis=(1, 2))
-        ready = size < SOLVED
+        ready = size < CLOSURE_SOLVER_TOL
         for whole, some in ((state.lengths, at.lengths), (state.q, at.q), (state.p, at.p), (state.R, at.R)):
             whole[work[ready]] = some[ready]
         done[work[ready]] = True
@@ -196,7 +196,7 @@ def close(
             lengths,
             at.q + x[:, of.count : of.count + n * m].reshape(len(work), n, m),
             at.p + shifting[work] * moves[..., :3],
-            at.R @ exponential(turning[work] * moves[..., 3:]),
+            at.R @ convert_vectors_to_rotations(turning[work] * moves[..., 3:]),
         )
     return state, done
 
@@ -226,7 +226,7 @@ def _of_poses(at: BatchState, turning: Array, shifting: Array, n: int) -> Array:
 def _step(J: Array, weights: Array, error: Array) -> Array:
     """The damped step of least weighted length that cancels the error to first order, no longer than allowed."""
     A = (J * weights).reshape(len(J), error.shape[1], -1)
-    damping = np.minimum(DAMPED, DAMPED * np.sum(error**2, axis=1)) + SOLVED
+    damping = np.minimum(DAMPED, DAMPED * np.sum(error**2, axis=1)) + CLOSURE_SOLVER_TOL
     H = A @ np.swapaxes(A, -1, -2) + damping[:, None, None] * np.eye(error.shape[1])
     x = -weights * (np.swapaxes(A, -1, -2) @ np.linalg.solve(H, error[..., None]))[..., 0]
     return np.asarray(x * np.minimum(1.0, LONGEST_STEP / np.maximum(np.abs(x).max(axis=1), LONGEST_STEP))[:, None])

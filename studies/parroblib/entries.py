@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from hrsynth.catalog.build import WordSource
-from hrsynth.catalog.entry import study
+from hrsynth.catalog.entry import analyze_mechanism
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.vectors import Array, cross
 from hrsynth.mechanism.builder import Builder
@@ -46,7 +46,7 @@ class PublishedEntry:
         the motors of the record are those of the first that sees all."""
         robot = published_robot(self.folder, name)
         drawn = mechanism(robot)
-        found = study(drawn, partial(_sets, robot), proved=False)
+        found = analyze_mechanism(drawn, partial(_sets, robot), proved=False)
         driven = _choices(robot)
         ranks = [found.motor_rank(_names(each)) for each in driven]
         best = ranks.index(found.facts["dof"]) if found.facts["dof"] in ranks else 0

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrsynth.geometry.vectors import Array
-from hrsynth.tolerances import RANK_CUTOFF
+from hrsynth.tolerances import RANK_CUTOFF_FRACTION
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ def count_ranks(values: Array, scale: Array | float = 1.0) -> tuple[Array, Array
     """How many descending singular values (..., k) are above the cutoff, and the gap that says so."""
     size = np.maximum(values[..., :1], scale)
     relative = np.maximum(values / np.where(size > 0, size, 1.0), np.finfo(float).eps)
-    rank = np.sum(relative > RANK_CUTOFF, axis=-1)
+    rank = np.sum(relative > RANK_CUTOFF_FRACTION, axis=-1)
     padded = np.concatenate(
         [np.ones_like(relative[..., :1]), relative, np.full_like(relative[..., :1], np.finfo(float).eps)], axis=-1
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from hrsynth.present.text.tables import listing, table
+from hrsynth.present.text.tables import format_listing, format_table
 
 HEADS = ("group", "robots", "moves so", "further", "not found", "losses", "agree", "in stated", "counts", "agree")
 SHOWN = 5
@@ -14,24 +14,24 @@ SHOWN = 5
 
 def describe_audit(record: Mapping[str, Any]) -> str:
     """The groups, what each column means, the kinds of disagreement with what settles them, the first of each kind."""
-    parts = [table([_group(each) for each in record["groups"]], HEADS), _legend(record)]
+    parts = [format_table([_group(each) for each in record["groups"]], HEADS), _legend(record)]
     sights = [
         (group["group"], each["verdict"], str(each["fewest"]), f"{each['number']:,}")
         for group in record["groups"]
         for each in group["watching"]
     ]
     if sights:
-        parts.append(table(sights, ("group", "observing all legs", "fewest legs with the same rank", "robots")))
+        parts.append(format_table(sights, ("group", "observing all legs", "fewest legs with the same rank", "robots")))
     kinds = list(_kinds(record["groups"]))
     if kinds:
         used = {settled for _, _, settled, _ in kinds}
         parts += [
-            table(kinds, ("group", "kind of disagreement", "settled", "number")),
-            listing(
+            format_table(kinds, ("group", "kind of disagreement", "settled", "number")),
+            format_listing(
                 [(kind, record["kinds"][kind]) for kind in record["kinds"] if any(each[1] == kind for each in kinds)]
             ),
-            listing([(name, words) for name, words in record["settlements"].items() if name in used]),
-            table(list(_first(record["disagreements"])), ("robot", "kind", "table", "computed", "settled")),
+            format_listing([(name, words) for name, words in record["settlements"].items() if name in used]),
+            format_table(list(_first(record["disagreements"])), ("robot", "kind", "table", "computed", "settled")),
         ]
     count = len(record["defects"])
     parts += (
@@ -83,7 +83,9 @@ def _legend(record: Mapping[str, Any]) -> str:
         ("counts", "robots with a stated number of working choices"),
     ]
     lost = len(record["without_chain"])
-    return listing([*rows, *([("no chain", f"{lost:,} more robots, whose leg chain is in no table")] if lost else [])])
+    return format_listing(
+        [*rows, *([("no chain", f"{lost:,} more robots, whose leg chain is in no table")] if lost else [])]
+    )
 
 
 def _kinds(groups: Iterable[Mapping[str, Any]]) -> Iterable[tuple[str, str, str, str]]:

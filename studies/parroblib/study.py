@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrsynth.geometry.ranks import CLEAN
-from hrsynth.geometry.so3 import exponential, logarithm
+from hrsynth.geometry.so3 import convert_rotations_to_vectors, convert_vectors_to_rotations
 from hrsynth.geometry.vectors import Array
-from hrsynth.tolerances import RANK_GAP
+from hrsynth.tolerances import RANK_GAP_MIN
 
 from .closing import BatchState, RobotBatch, batch, close, legs_at
 from .freedoms import PlatformFreedoms, freedoms, freedoms_left, within
@@ -149,7 +149,7 @@ def _trial(
     for b, robot in enumerate(robots):
         motors = {driven: held[driven] for driven in motor_choices(robot)}
         gap = min(float(clear[b]), float(clear_later[b]), *(float(each[2][b]) for each in motors.values()))
-        steady = all(each[3][b] for each in motors.values()) and gap >= RANK_GAP
+        steady = all(each[3][b] for each in motors.values()) and gap >= RANK_GAP_MIN
         if not (good[b] and steady):
             found.append(None)
             continue
@@ -189,7 +189,7 @@ def _close_at_random(
     shifting = np.full((B, poses, 3), 1.0 if poses == 1 else 0.0)
     return close(
         of.at_poses(poses) if poses > 1 else of,
-        BatchState(lengths, q, p, exponential(turns)),
+        BatchState(lengths, q, p, convert_vectors_to_rotations(turns)),
         free,
         shifting,
         sized=True,
@@ -241,9 +241,11 @@ def _can_leave(
     V *= 3 * CHANGED / np.maximum(np.linalg.norm(V, axis=1), CHANGED)[:, None]
     legs = legs_at(of, at)
     rates = np.einsum("bnij,bj->bni", np.linalg.pinv(np.swapaxes(legs, -1, -2), rcond=1e-9), V)
-    start = BatchState(at.lengths, at.q + rates, at.p + V[:, None, :3], exponential(V[:, 3:])[:, None] @ at.R)
+    start = BatchState(
+        at.lengths, at.q + rates, at.p + V[:, None, :3], convert_vectors_to_rotations(V[:, 3:])[:, None] @ at.R
+    )
     end, done = close(of, start, np.ones((B, 1, 3)), np.ones((B, 1, 3)), sized=False)
-    turn = logarithm(end.R[:, 0] @ np.swapaxes(at.R[:, 0], -1, -2))
+    turn = convert_rotations_to_vectors(end.R[:, 0] @ np.swapaxes(at.R[:, 0], -1, -2))
     off = np.linalg.norm(turn * (1 - axes), axis=1)
     return np.asarray(done & (off > TURNED) & (freedoms(legs_at(of, end)).dof == now.dof))
 

@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from hrsynth.geometry.vectors import Array, cross, hat
-from hrsynth.tolerances import RANK_GAP, SAME_DIRECTION
+from hrsynth.tolerances import DIRECTION_SINE_TOL, RANK_GAP_MIN
 
 from .freedoms import count_ranks, denied_freedoms
 
@@ -40,12 +40,12 @@ def watching(screws: Array, kinds: str, dof: int) -> WatchedLegs | None:
         rates[:, : last + 1] = -hat(u) @ leg[: last + 1, 3:].T  # u̇ = ω × u, slides do not turn
         _, s, Vt = np.linalg.svd(rates)
         rank, gap = count_ranks(s)
-        if gap < RANK_GAP:
+        if gap < RANK_GAP_MIN:
             return None
         kept.append(np.pad(Vt[rank:] @ leg, ((0, int(rank)), (0, 0))))
     free, gaps, _ = denied_freedoms(screws)
     held, more, _ = denied_freedoms(np.stack(kept))
-    if min(gaps.min(), more.min()) < RANK_GAP:
+    if min(gaps.min(), more.min()) < RANK_GAP_MIN:
         return None
     best: int | None = None
     for size in [n, *range(n)]:
@@ -53,7 +53,7 @@ def watching(screws: Array, kinds: str, dof: int) -> WatchedLegs | None:
         chosen = np.array([[leg in each for leg in range(n)] for each in sets])[..., None, None]
         stacked = np.where(chosen, held, free).reshape(len(sets), 6 * n, 6)
         ranks, clear = count_ranks(np.asarray(np.linalg.svd(stacked, compute_uv=False)))
-        if clear.min() < RANK_GAP:
+        if clear.min() < RANK_GAP_MIN:
             return None
         if best is None:
             best = int(ranks[0])
@@ -78,7 +78,7 @@ def _segment(leg: Array, kinds: str) -> tuple[int, Array] | None:
         return last, leg[last, :3] / np.linalg.norm(leg[last, :3])
     u = _between(leg[last - _together(leg, kinds, last) + 1 : last + 1], leg[m - size :])
     length = np.linalg.norm(u)
-    return (last, u / length) if length > SAME_DIRECTION else None
+    return (last, u / length) if length > DIRECTION_SINE_TOL else None
 
 
 def _together(leg: Array, kinds: str, last: int) -> int:
@@ -89,13 +89,13 @@ def _together(leg: Array, kinds: str, last: int) -> int:
         and all(_meet(leg[a], leg[b]) for a, b in combinations(range(last - 2, last + 1), 2))
     ):
         points = [_point(leg[a : a + 2]) for a in (last - 2, last - 1)]
-        if np.linalg.norm(points[0] - points[1]) < SAME_DIRECTION:
+        if np.linalg.norm(points[0] - points[1]) < DIRECTION_SINE_TOL:
             return 3
     if (
         last >= 1
         and kinds[last - 1 : last + 1] == "RR"
         and _meet(leg[last - 1], leg[last])
-        and (abs(leg[last - 1, 3:] @ leg[last, 3:]) < SAME_DIRECTION)
+        and (abs(leg[last - 1, 3:] @ leg[last, 3:]) < DIRECTION_SINE_TOL)
     ):
         return 2
     return 1
@@ -103,7 +103,7 @@ def _together(leg: Array, kinds: str, last: int) -> int:
 
 def _meet(a: Array, b: Array) -> bool:
     """Whether two axes meet and are not parallel."""
-    return bool(abs(a[:3] @ b[3:] + b[:3] @ a[3:]) < SAME_DIRECTION < np.linalg.norm(cross(a[3:], b[3:])))
+    return bool(abs(a[:3] @ b[3:] + b[:3] @ a[3:]) < DIRECTION_SINE_TOL < np.linalg.norm(cross(a[3:], b[3:])))
 
 
 def _foot(a: Array) -> Array:
@@ -128,6 +128,6 @@ def _between(before: Array, after: Array) -> Array:
             if len(axes) == 1:
                 apart = apart - axes[0, 3:] * (axes[0, 3:] @ apart)
         return np.asarray(apart)
-    if np.linalg.norm(normal) < SAME_DIRECTION:
+    if np.linalg.norm(normal) < DIRECTION_SINE_TOL:
         return np.asarray(apart - a * (a @ apart))
     return np.asarray(normal * (normal @ apart) / (normal @ normal))

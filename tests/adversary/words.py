@@ -23,10 +23,10 @@ def write(group: str, rng: np.random.Generator, path: Path) -> str:
     """A random word of a group with random dimensions, written as a file; the word and the number of its draw."""
     import hrsynth
     from hrsynth.catalog.architecture_key import parse
-    from hrsynth.catalog.geometry import mechanism
+    from hrsynth.catalog.geometry import build_mechanism
 
     word, attempt = str(rng.choice(listed(group))), int(rng.integers(1, 10_000))
-    hrsynth.save(mechanism(parse(word), attempt), path)
+    hrsynth.save(build_mechanism(parse(word), attempt), path)
     return f"{word} {attempt}"
 
 

@@ -15,17 +15,17 @@ from hypothesis import strategies as st
 
 import hrsynth
 from hrsynth.analysis import advice as module
-from hrsynth.analysis.advice import Advice, advise, candidates
+from hrsynth.analysis.advice import Advice, advise, list_candidates
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
 from hrsynth.description import load
 from hrsynth.description.observation_text import split_offers
 from hrsynth.errors import BadRequest, HrsynthError
-from hrsynth.geometry.vectors import Array, unit
+from hrsynth.geometry.vectors import Array, normalise_vector
 from hrsynth.mechanism import Mechanism, Observation
 from hrsynth.mechanism.builder import Builder
 from hrsynth.present.text import robots as text
-from hrsynth.tolerances import RANK_GAP
+from hrsynth.tolerances import RANK_GAP_MIN
 from kinematics.robots import ROBOTS, setting_of
 from oracle import NotAssembled, Oracle, Undecided
 from strategies import parallel_robots, random_rotation, transformed
@@ -73,7 +73,7 @@ class Independent:
         self, robot: Mechanism, observe: str | None, camera: str | None = None, seed: int = 1, *, at_zero: bool = False
     ) -> None:
         setup = ObservedRobot.of(robot, observe, camera, samples=1)
-        self.everything = candidates(setup)
+        self.everything = list_candidates(setup)
         oracle = Oracle(setup.mechanism)
         self.state = (
             np.array([link.pose for link in setup.mechanism.links.values()])
@@ -159,7 +159,7 @@ def test_cures_that_are_none_at_zero_are_told(robot: str, observe: str, fewer: i
     assert [each.verdict.rank_at_zero for each in answer.sets] == [None if rank == dof else rank for rank in shown]
     assert sum(rank < dof for rank in shown) == fewer
     assert [each.to_dict().get("rank_at_zero", dof) for each in answer.sets] == shown
-    said = text.advice(answer)
+    said = text.format_advice(answer)
     assert ("at the zero configuration, a Type 2 singularity" in said) == (fewer > 0)
     assert not fewer or f"\n{fewer} of these have a lower rank" in said
 
@@ -199,7 +199,7 @@ def test_parallel_rails_need_one_rail_or_one_line(robot: str) -> None:
     assert singles(answer, "encoder") == rails
     assert singles(answer, "line") == {o.link for o in setup.observed}
     assert len(answer.sets) == len(answer.setup.observed) * 2
-    assert all(m.actuated for each in answer.sets for m in each.measurements if m.kind == "encoder")
+    assert all(m.is_actuated for each in answer.sets for m in each.measurements if m.kind == "encoder")
 
 
 @pytest.mark.some(1)
@@ -208,8 +208,8 @@ def test_blind_planar_robots(robot: str, size: int) -> None:
     """Directions that all turn as one (or not at all) leave two (three) freedoms: as many encoders or lines."""
     answer = found(robot)
     assert answer.size == size
-    assert answer.cured
-    motors = {j.name for j in setting_of(robot).mechanism.joints.values() if j.actuated}
+    assert answer.has_sufficient_sets
+    motors = {j.name for j in setting_of(robot).mechanism.joints.values() if j.is_actuated}
     driven = [each for each in answer.sets if {m.of for m in each.measurements} <= motors]
     assert len(driven) == comb(3, size)
     assert ("line",) * size in kinds(answer)
@@ -264,7 +264,7 @@ def test_the_record(robot: str) -> None:
     assert len(record["sets"]) == len(answer.sets) <= record["tried"]
     for each in record["sets"]:
         assert (each["verdict"], each["rank"]) == (CONTROLLABLE, record["dof"])
-        assert each["gap"] > RANK_GAP
+        assert each["gap"] > RANK_GAP_MIN
         assert len(each["measurements"]) == record["size"]
         for m in each["measurements"]:
             assert m["kind"] in ("leg", "direction", "line", "encoder")
@@ -282,9 +282,9 @@ def test_where_the_robot_stands_and_the_seed_do_not_matter(robot: str) -> None:
 def test_the_budget_is_kept_and_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where no set within the budget cures, the best there are come back, and the answer says that it is not
     complete."""
-    monkeypatch.setattr(module, "LARGEST_SIZE", 2)
+    monkeypatch.setattr(module, "ADVICE_SET_SIZE_MAX", 2)
     answer = advise(load("3ppr_m1"))
-    assert not answer.cured
+    assert not answer.has_sufficient_sets
     assert not answer.complete
     assert answer.size == 2
     assert {each.verdict.rank for each in answer.sets} == {2}
@@ -301,7 +301,7 @@ def two_rods(foot: str, charm: bool = False) -> Mechanism:
     builder.link("platform", (0.0, 0.1, 1.0), random_rotation(rng))
     for number, side in ((1, -1.0), (2, 1.0)):
         A, B = np.array([side, 0.2, 0.1]), np.array([0.4 * side, 0.0, 0.9])
-        first = unit(np.cross(B - A, (1.0, 2.0, 0.5)))
+        first = normalise_vector(np.cross(B - A, (1.0, 2.0, 0.5)))
         above = "base"
         if foot == "PU":
             above = f"carriage_{number}"
@@ -333,26 +333,26 @@ def test_nothing_helps(charm: bool) -> None:
     assert (answer.now.verdict, answer.now.rank, answer.now.dof) == (PARTIAL, 3, 4)
     assert [freedom.name for freedom in answer.now.unobserved] == ["rotation about the line B1 B2"]
     assert not answer.sets
-    assert not answer.cured
+    assert not answer.has_sufficient_sets
     assert not answer.nothing_missing
     assert answer.complete
-    assert text.advice(answer).endswith("\nNo set of legs, links, lines and encoders has a higher rank")
+    assert text.format_advice(answer).endswith("\nNo set of legs, links, lines and encoders has a higher rank")
 
 
 def test_some_of_it_helps() -> None:
     """The rails' encoders (or the rods' lines) see one of the two lost freedoms; the other stays."""
     answer = advise(two_rods("PU"))
     assert (answer.now.rank, answer.now.dof) == (4, 6)
-    assert (answer.size, answer.cured, answer.complete) == (1, False, True)
+    assert (answer.size, answer.has_sufficient_sets, answer.complete) == (1, False, True)
     assert {each.verdict.rank for each in answer.sets} == {5}
     assert singles(answer, "encoder") == {"rail_1", "rail_2"}
     assert singles(answer, "line") == {"rod_1", "rod_2"}
-    assert text.advice(answer).endswith("\nNo set of legs, links, lines and encoders has a higher rank")
+    assert text.format_advice(answer).endswith("\nNo set of legs, links, lines and encoders has a higher rank")
 
 
 @pytest.mark.parametrize(("robot", "observe"), [("3rrp", "all"), ("gough_stewart", "1")])
 def test_in_small_batches_too(monkeypatch: pytest.MonkeyPatch, robot: str, observe: str) -> None:
-    monkeypatch.setattr(module, "BATCH", 7)
+    monkeypatch.setattr(module, "ADVICE_BATCH_COUNT", 7)
     answer = advise(load(robot), observe)
     assert (sets_of(answer), answer.tried) == (sets_of(found(robot, observe)), found(robot, observe).tried)
 
@@ -360,8 +360,10 @@ def test_in_small_batches_too(monkeypatch: pytest.MonkeyPatch, robot: str, obser
 @pytest.mark.parametrize("robot", ["3prp", "gough_stewart", "quattro", "3upu"])
 def test_motors_come_first(robot: str) -> None:
     """Legs, directions, lines, then encoders, those on joints with motors before the others."""
-    all_samples = candidates(setting_of(robot, ("1",)))
-    order = [("leg", "direction", "line", "encoder").index(each.kind) - bool(each.actuated) / 2 for each in all_samples]
+    all_samples = list_candidates(setting_of(robot, ("1",)))
+    order = [
+        ("leg", "direction", "line", "encoder").index(each.kind) - bool(each.is_actuated) / 2 for each in all_samples
+    ]
     assert order == sorted(order)
     assert "1" not in {each.of for each in all_samples if each.kind == "leg"}
 
@@ -389,7 +391,7 @@ def test_every_robot_with_one_leg_observed(robot: str, camera: str | None) -> No
         pytest.skip("the platform has another name")
     answer = found(robot, "1", camera)
     oracle = Independent(load(robot), "1", camera)
-    assert answer.cured
+    assert answer.has_sufficient_sets
     assert answer.complete
     rng = np.random.default_rng(0)
     names = list(oracle.rows)
@@ -416,7 +418,7 @@ def test_no_set_that_sees_as_much_is_cheaper(cost: str) -> None:
     candidate_sensor = ",".join(f"point:platform@{place}" for place in places)
     told = hrsynth.advise("gough_stewart", ["1"], "eye=base@0.3,0.1,0", candidate_sensor=candidate_sensor, cost=cost)
     costs = {kind: float(number) for kind, _, number in (part.partition("=") for part in cost.split(",") if part)}
-    assert told.cured
+    assert told.has_sufficient_sets
     paid = {each.cost for each in told.sets}
     assert max(paid) - min(paid) < 1e-9
     for each in told.sets[:3]:

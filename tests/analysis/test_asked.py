@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import hrsynth
-from hrsynth.analysis.pose_requests import configurations_at
+from hrsynth.analysis.pose_requests import solve_configurations
 from hrsynth.description import list_robots, load
-from hrsynth.errors import BadRequest, PoseNotReached
+from hrsynth.errors import BadRequest, PoseReachFailure
 from hrsynth.kinematics.configuration import measure
-from hrsynth.mechanism.pose import ModeNumber, Pose, asked_pose
+from hrsynth.mechanism.pose import ModeNumber, Pose, parse_pose
 
 ROBOTS = [
     ("3rrr_m1", None, "x=0.01,y=0.01,phi=5deg"),
@@ -26,7 +26,7 @@ def test_a_mode_by_its_number_is_the_robot_assembled_there(name: str, legs: str 
     listed = hrsynth.modes(setup, at=about)
     numbers = [k for k, mode in enumerate(listed.modes, 1) if mode.configuration is not None]
     assert len(numbers) > 1
-    first, *found = configurations_at(setup, [Pose.parse(about), *(ModeNumber(k) for k in numbers)])
+    first, *found = solve_configurations(setup, [Pose.parse(about), *(ModeNumber(k) for k in numbers)])
     observation_model = setup.samples.observation_model
     wanted = np.concatenate(
         measure(first.model, first.q, observation_model.reference, observation_model.observations)[2]
@@ -60,7 +60,7 @@ def test_a_robot_is_observed_from_a_mode_on(name: str, watched: str | None):
     setup = hrsynth.observe(robot, watched)
     number = next(k for k, mode in enumerate(hrsynth.modes(setup).modes, 1) if mode.configuration and not mode.goal)
     begun = hrsynth.observe(robot, watched, at=f"mode:{number}")
-    start, (there,) = begun.all_samples.start, configurations_at(setup, [ModeNumber(number)])
+    start, (there,) = begun.all_samples.start, solve_configurations(setup, [ModeNumber(number)])
     assert all(np.abs(start.pose(link) - there.pose(link)).max() < 1e-9 for link in setup.mechanism.links)
     assert hrsynth.derive(robot, watched, at=f"mode:{number}").to_dict() == hrsynth.derive(begun).to_dict()
     assert begun.robot.file == robot.file
@@ -96,13 +96,13 @@ def test_a_mode_that_is_not_assembled_is_not_reached():
     listed = hrsynth.modes(setup)
     lost = next((k for k, mode in enumerate(listed.modes, 1) if mode.configuration is None), None)
     if lost is not None:
-        with pytest.raises(PoseNotReached, match="was not found assembled"):
-            configurations_at(setup, [ModeNumber(lost)])
+        with pytest.raises(PoseReachFailure, match="was not found assembled"):
+            solve_configurations(setup, [ModeNumber(lost)])
 
 
 def test_texts_without_a_number_are_poses():
-    assert asked_pose("x=0.1") == Pose(x=0.1)
-    assert asked_pose(" mode:12 ") == ModeNumber(12)
+    assert parse_pose("x=0.1") == Pose(x=0.1)
+    assert parse_pose(" mode:12 ") == ModeNumber(12)
     assert str(ModeNumber(3)) == "mode:3"
     with pytest.raises(BadRequest):
-        asked_pose("modes:1")
+        parse_pose("modes:1")

@@ -16,12 +16,17 @@ from hrsynth.analysis import configuration_report as posture_module
 from hrsynth.analysis.check import MEASURES, UNREACHABLE, Check, check
 from hrsynth.analysis.configuration_report import ConfigurationAnalysis, ConfigurationReport
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.analysis.singularity_indices import Counts, interaction_matrix, redundant_rows, surplus
+from hrsynth.analysis.singularity_indices import (
+    Counts,
+    compute_interaction_matrix,
+    count_redundant_rows,
+    subtract_generic_rows,
+)
 from hrsynth.description import load
 from hrsynth.geometry.ranks import CLEAN
-from hrsynth.geometry.vectors import Array, inverse
+from hrsynth.geometry.vectors import Array, invert_pose
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.velocity_relation import VelocityRelation, relation
+from hrsynth.kinematics.velocity_relation import VelocityRelation, compute_relation
 from hrsynth.mechanism import JointType, Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Limits
@@ -49,14 +54,14 @@ def check_identities(found: ConfigurationReport) -> None:
         c = kinds.singularity_indices
         assert c.IO == c.RI + c.RPM - c.IIM
         assert c.II == c.RO + c.RPM - c.IIM
-        assert c.type3 == (c.type1 and c.type2)
+        assert c.is_type3 == (c.is_type1 and c.is_type2)
 
 
 def motor_rates(oracle: Oracle, state: Array, velocities: Array) -> Array:
     """The rates of the R and P motors that the links' twists make, lengths in characteristic lengths."""
     rows = []
     for joint in oracle.mechanism.joints.values():
-        if not joint.actuated:
+        if not joint.is_actuated:
             continue
         assert joint.type in (JointType.REVOLUTE, JointType.PRISMATIC), joint.name
         before, after = (oracle.twist(velocities, link) for link in joint.links)
@@ -85,7 +90,7 @@ def test_ranks_are_those_of_the_oracle(robot: str) -> None:
     for at in (setup.all_samples.start, *(m.configuration for m in setup.all_samples.members)):
         found = examiner.examine(at)
         check_identities(found)
-        assert found.decided
+        assert found.has_decided_ranks
         state = state_of(at.model, at.q)
         point = observation_model.point is not None
         seen = oracle.relation(state, observation_model.observations, point_only=point)
@@ -118,8 +123,8 @@ def test_singular_values_are_those_of_the_oracle(robot: str) -> None:
         assert distances.condition == pytest.approx(values[0] / values[-1], rel=1e-6)
         error = np.hypot(distances.millimetres / (1e3 * oracle.length * np.radians(1)), distances.degrees)
         assert error == pytest.approx(1 / values[-1], rel=1e-6)
-        found = relation(at, setup.samples.observation_model)
-        M = interaction_matrix(found)
+        found = compute_relation(at, setup.samples.observation_model)
+        M = compute_interaction_matrix(found)
         assert M is not None
         t = found.twist_part @ np.ones(found.dimension)
         np.testing.assert_allclose(M @ (found.twists.T @ t), found.rates @ np.ones(found.dimension), atol=1e-9)
@@ -131,7 +136,7 @@ def test_redundant_rows_add_up(robot: str) -> None:
     """All rows of the loops less their rank, at zero and at samples; what is redundant only here is what is lost."""
     examiner = ConfigurationAnalysis(setting_of(robot))
     for at in (examiner.setup.all_samples.start, *(m.configuration for m in examiner.setup.all_samples.members)):
-        rows = redundant_rows(at)
+        rows = count_redundant_rows(at)
         J = at.model.jacobian(at.q)
         assert sum(count for _, count in rows) == len(J) - np.linalg.matrix_rank(J, tol=1e-8)
         assert {name for name, _ in rows} == set(at.model.loops)
@@ -141,10 +146,10 @@ def test_redundant_rows_add_up(robot: str) -> None:
 
 def test_surplus_rows_stay_where_the_loss_stays() -> None:
     usual = (("a", 0), ("b", 2), ("c", 1))
-    assert surplus((("a", 0), ("b", 2), ("c", 2)), usual) == (("a", 0), ("b", 0), ("c", 1))
-    assert surplus((("a", 1), ("b", 1), ("c", 1)), usual) == (("a", 0), ("b", 0), ("c", 0))
-    assert surplus((("a", 1), ("b", 2), ("c", 2)), usual) == (("a", 1), ("b", 0), ("c", 1))
-    assert surplus((), usual) == ()
+    assert subtract_generic_rows((("a", 0), ("b", 2), ("c", 2)), usual) == (("a", 0), ("b", 0), ("c", 1))
+    assert subtract_generic_rows((("a", 1), ("b", 1), ("c", 1)), usual) == (("a", 0), ("b", 0), ("c", 0))
+    assert subtract_generic_rows((("a", 1), ("b", 2), ("c", 2)), usual) == (("a", 1), ("b", 0), ("c", 1))
+    assert subtract_generic_rows((), usual) == ()
 
 
 @pytest.mark.some(3)
@@ -259,7 +264,7 @@ def test_random_robots_obey_the_identities(mechanism: Mechanism) -> None:
     for at in (setup.all_samples.start, *(m.configuration for m in setup.all_samples.members)):
         found = examiner.examine(at)
         check_identities(found)
-        counts = Counts.of(relation(at, setup.samples.observation_model))
+        counts = Counts.of(compute_relation(at, setup.samples.observation_model))
         assert counts.relation == counts.dof + counts.unexplained == counts.seen + counts.unseen
         assert found.mobility.total >= found.mobility.internal >= 0
 
@@ -289,10 +294,10 @@ def test_a_grid_reaches_whatever_legs_that_stretch_without_limit_reach() -> None
 def test_a_pose_beyond_joint_limits_says_so() -> None:
     robot = load("3rpr_m1")
     made = robot.changed(
-        joints=[replace(joint, limits=Limits(-1e-3, 1e-3)) for joint in robot.joints.values() if joint.actuated]
+        joints=[replace(joint, limits=Limits(-1e-3, 1e-3)) for joint in robot.joints.values() if joint.is_actuated]
     )
     (at,), (home,) = (check(made, at=poses).postures for poses in (["x=0.05,y=0,phi=0"], []))
-    assert set(at.to_dict()["beyond_limits"]) == {name for name, joint in robot.joints.items() if joint.actuated}
+    assert set(at.to_dict()["beyond_limits"]) == {name for name, joint in robot.joints.items() if joint.is_actuated}
     assert home.beyond_limits == ()
 
 
@@ -326,10 +331,10 @@ def test_without_motors_nothing_is_said_of_the_real_robot() -> None:
 
 
 def test_a_rank_that_is_not_clear_is_no_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(posture_module, "RANK_GAP", 1e30)
+    monkeypatch.setattr(posture_module, "RANK_GAP_MIN", 1e30)
     (found,) = check(load("3rrr_m1")).postures
     record = found.to_dict()
-    assert not found.decided
+    assert not found.has_decided_ranks
     assert record["type1"] is record["type2"] is record["type3"] is record["singularity_indices"] is None
     assert record["constraint"]["singular"] is None
     assert found.hidden.state == "undecided"
@@ -345,7 +350,7 @@ def test_the_singular_pose_really_moves() -> None:
     lost = kernel @ np.linalg.svd(rows[6:])[2][-1]
     h = 1e-5
     ahead, behind = (ClosedConfiguration(at.model, at.model.integrate(at.q, s * h * lost), 0.0) for s in (1, -1))
-    moved = inverse(behind.pose("dist_1")) @ ahead.pose("dist_1")
+    moved = invert_pose(behind.pose("dist_1")) @ ahead.pose("dist_1")
     assert np.linalg.norm(moved[:3, 3]) > 1e-6
     target = answer.setup.samples.observation_model.target
     for (_, a), (_, b) in zip(target(ahead).measured, target(behind).measured, strict=True):

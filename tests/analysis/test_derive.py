@@ -12,11 +12,11 @@ import pytest
 import yourdfpy
 
 import hrsynth
-from hrsynth.analysis.derive import STEP_SAMPLES, Derivation, derive
-from hrsynth.analysis.observed import SAMPLES
+from hrsynth.analysis.derive import REWRITE_STEP_SAMPLES_COUNT, Derivation, derive
+from hrsynth.analysis.observed import GENERIC_SAMPLES_COUNT
 from hrsynth.analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
 from hrsynth.catalog.architecture_key import parse
-from hrsynth.catalog.geometry import mechanism as catalog_mechanism
+from hrsynth.catalog.geometry import build_mechanism as catalog_mechanism
 from hrsynth.description import load, native
 from hrsynth.errors import BadRequest, NoEquivalentRobot
 from hrsynth.kinematics.equivalence import EquivalenceCheck, check_equivalence
@@ -24,8 +24,8 @@ from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism.model import JointType
 from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.rewrite.evidence import Evidence
-from hrsynth.rewrite.strategy import SIMPLIFIED, Rewriting
-from hrsynth.tolerances import ASSEMBLED, FOLLOWED, RANK_GAP, SAME_RELATION
+from hrsynth.rewrite.strategy import SIMPLIFIED, RewriteTrace
+from hrsynth.tolerances import HIDDEN_ROBOT_RESIDUAL_TOL, RANK_GAP_MIN, RELATION_ANGLE_TOL, ZERO_ASSEMBLY_TOL
 from kinematics.robots import ROBOTS, derived
 from oracle import Oracle
 from strategies import deltas
@@ -83,11 +83,11 @@ def certified(derivation: Derivation) -> None:
     """The certificate passed, with evidence."""
     certificate = derivation.equivalence
     assert certificate.passed
-    assert certificate.samples == SAMPLES
-    assert certificate.largest_angle < SAME_RELATION
-    assert certificate.residual < FOLLOWED
-    assert certificate.smallest_gap > RANK_GAP
-    assert derivation.verdict.gap > RANK_GAP
+    assert certificate.samples == GENERIC_SAMPLES_COUNT
+    assert certificate.largest_angle < RELATION_ANGLE_TOL
+    assert certificate.residual < HIDDEN_ROBOT_RESIDUAL_TOL
+    assert certificate.smallest_gap > RANK_GAP_MIN
+    assert derivation.verdict.gap > RANK_GAP_MIN
     assert derivation.verdict.rank + len(derivation.verdict.unobserved) == derivation.dof
 
 
@@ -100,7 +100,7 @@ def emitted(derivation: Derivation) -> None:
     assert again.differences(hidden) == []
     assert hidden.differences(again) == []
     robot_model = PinocchioModel(again)
-    assert np.linalg.norm(robot_model.residual(robot_model.q0)) < ASSEMBLED
+    assert np.linalg.norm(robot_model.residual(robot_model.q0)) < ZERO_ASSEMBLY_TOL
     assert Oracle(again).error(Oracle(again).zero()) < 1e-11
 
     model = pin.buildModelFromXML(text)
@@ -120,7 +120,7 @@ def emitted(derivation: Derivation) -> None:
     for name in hidden.links.keys() & real.links.keys():
         np.testing.assert_array_equal(hidden.links[name].pose, real.links[name].pose)
     assert hidden.platform in real.links
-    actuated = [joint for joint in hidden.joints.values() if joint.actuated]
+    actuated = [joint for joint in hidden.joints.values() if joint.is_actuated]
     assert actuated
     assert all(joint.name not in setup.robot.joints for joint in actuated)
     assert all(joint.name not in real.joints for joint in actuated)
@@ -169,7 +169,7 @@ def test_all_legs_observed(robot: str) -> None:
 def test_translations_along_the_slides_are_lost(robot: str) -> None:
     """Parallel P joints next to the base: no direction changes when all of them move alike (MMT 4.2.3)."""
     derivation = derived(robot)
-    rails = [j.axis for j in derivation.setup.mechanism.joints.values() if j.actuated]
+    rails = [j.axis for j in derivation.setup.mechanism.joints.values() if j.is_actuated]
     (lost,) = derivation.verdict.unobserved
     assert lost.twist.shape == (6,)
     np.testing.assert_allclose(lost.twist[3:], 0, atol=1e-12)
@@ -277,10 +277,10 @@ def test_steps_are_those_that_are_taken_one_by_one(robot: str, legs: tuple[str, 
     found = derived(robot, legs)
     samples = found.setup.samples
     checked = SIMPLIFIED(
-        Rewriting.of(
+        RewriteTrace.of(
             Evidence(found.setup.decomposition, samples),
             lambda mechanism, bodies: check_equivalence(
-                samples, mechanism, count=STEP_SAMPLES, bodies=bodies, complete=False
+                samples, mechanism, count=REWRITE_STEP_SAMPLES_COUNT, bodies=bodies, complete=False
             ),
         )
     )
@@ -297,7 +297,7 @@ def test_one_leg_of_a_delta_needs_another() -> None:
     assert unchecked is not None
     assert not unchecked.equivalent
     assert unchecked.hidden.ascii == "Pi-{2-U*U}"
-    assert unchecked.largest_angle > SAME_RELATION
+    assert unchecked.largest_angle > RELATION_ANGLE_TOL
     assert len(unchecked.gains) == 1
     assert unchecked.gains[0].name.startswith("rotation about")
     assert np.linalg.norm(unchecked.gains[0].twist[3:]) == pytest.approx(1)
@@ -529,7 +529,7 @@ def test_a_second_attempt_keeps_to_the_form_that_was_asked_for(
     monkeypatch: pytest.MonkeyPatch, form: str, expected: str
 ) -> None:
     answers = iter([False])
-    monkeypatch.setattr(Rewriting, "virtual_only", property(lambda self: next(answers, True)))
+    monkeypatch.setattr(RewriteTrace, "has_virtual_motors_only", property(lambda self: next(answers, True)))
     found = derive(load("rrrrr_m1"), form=form)
     assert next(answers, None) is None
     assert found.hidden_architecture is not None

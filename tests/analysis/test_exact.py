@@ -17,22 +17,37 @@ from hypothesis import strategies as st
 from hrsynth.analysis import instances
 from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.derive import derive
-from hrsynth.analysis.exact import INSTANCES, TESTS, ExactArchitecture, ExactVerdict, architecture, architecture_of
-from hrsynth.analysis.instances import Geometry, Instance, NotRecognised, draw, kernel, observed_direction, rank
+from hrsynth.analysis.exact import (
+    EXACT_RANK_INSTANCES_COUNT,
+    IDENTITY_INSTANCES_COUNT,
+    ExactArchitecture,
+    ExactVerdict,
+    build_architecture,
+    get_architecture,
+)
+from hrsynth.analysis.instances import (
+    Geometry,
+    Instance,
+    RecognitionFailure,
+    compute_exact_kernel,
+    compute_observed_direction,
+    draw,
+    rank,
+)
 from hrsynth.analysis.observed import ObservedRobot, select_relation
 from hrsynth.analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
 from hrsynth.errors import HrsynthError
-from hrsynth.geometry.vectors import Array, frozen, unit
+from hrsynth.geometry.vectors import Array, freeze_array, normalise_vector
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
-from hrsynth.kinematics.velocity_relation import ObservationModel, relation
+from hrsynth.kinematics.velocity_relation import ObservationModel, compute_relation
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.incidences import DirectionSource, Incidences
 from hrsynth.mechanism.model import Coupling
 from hrsynth.mechanism.observation import Observation
 from hrsynth.mechanism.observations.direction import Direction
-from hrsynth.mechanism.sensors import encoders
+from hrsynth.mechanism.sensors import make_encoders
 from hrsynth.present.text import robots as text
 from kinematics.robots import ROBOTS, setting_of
 from oracle import Oracle
@@ -59,7 +74,7 @@ def checked(verdict: ExactVerdict) -> None:
         return
     assert (verdict.verdict == CONTROLLABLE) == (verdict.rank == verdict.dof)
     assert (verdict.verdict == BLIND) == (verdict.rank == 0)
-    assert verdict.instances == (1 if verdict.rank == verdict.dof else INSTANCES)
+    assert verdict.instances == (1 if verdict.rank == verdict.dof else EXACT_RANK_INSTANCES_COUNT)
 
 
 @pytest.mark.some(2)
@@ -67,7 +82,7 @@ def checked(verdict: ExactVerdict) -> None:
 def test_exact_ranks_are_the_numerical_ones(robot: str) -> None:
     """Every shipped robot, every set of legs."""
     setup = setting_of(robot)
-    generic = architecture(setup)
+    generic = get_architecture(setup)
     for places, observed in sets(setup):
         verdict = generic.verdict(observed)
         checked(verdict)
@@ -78,7 +93,7 @@ def test_exact_ranks_are_the_numerical_ones(robot: str) -> None:
 def placed(mechanism: Mechanism, relations: Incidences, drawn: Geometry) -> Mechanism:
     """A mechanism of doubles with the geometry of an instance."""
     centres = np.array([[float(x.p) / float(x.q) for x in point] for point in drawn.centres])
-    directions = [unit(doubles(d)) for d in drawn.directions]
+    directions = [normalise_vector(doubles(d)) for d in drawn.directions]
     joints = [
         replace(
             joint,
@@ -92,7 +107,7 @@ def placed(mechanism: Mechanism, relations: Incidences, drawn: Geometry) -> Mech
     if relations.point is not None:
         X = np.eye(4)
         X[:3, 3] = centres[relations.point]
-        found = found.changed(links=[replace(platform, pose=frozen(X))])
+        found = found.changed(links=[replace(platform, pose=freeze_array(X))])
     return found
 
 
@@ -108,12 +123,14 @@ def doubles(vector: object) -> Array:
 def test_an_instance_is_a_mechanism_of_the_same_kind(robot: str) -> None:
     """The oracle, given the instance's geometry in doubles, finds the same dimensions as exact arithmetic."""
     setup = setting_of(robot)
-    generic = architecture(setup)
+    generic = get_architecture(setup)
     drawn = draw(generic.relations, random.Random(0))
     exact = generic.instance(0)
     mechanism = placed(setup.mechanism, generic.relations, drawn)
     observations = [
-        Direction(o.leg, o.link, mechanism.links[o.link].pose[:3, :3].T @ doubles(observed_direction(sight, drawn)))
+        Direction(
+            o.leg, o.link, mechanism.links[o.link].pose[:3, :3].T @ doubles(compute_observed_direction(sight, drawn))
+        )
         for o, sight in zip(generic.observations, generic.relations.sights, strict=True)
     ]
     oracle = Oracle(mechanism)
@@ -126,7 +143,7 @@ def test_an_instance_is_a_mechanism_of_the_same_kind(robot: str) -> None:
 
 
 def test_an_instance_keeps_all_relations_exactly() -> None:
-    relations = architecture(setting_of("quattro")).relations
+    relations = get_architecture(setting_of("quattro")).relations
     drawn = draw(relations, random.Random(3))
     for number, conditions in enumerate(relations.tower):
         for by in conditions:
@@ -147,17 +164,17 @@ def test_an_instance_keeps_all_relations_exactly() -> None:
 def test_directions_that_follow_from_axes_and_centres() -> None:
     rng = random.Random(5)
     drawn = Geometry(
-        (instances.random_numbers(3, rng), instances.random_numbers(3, rng)),
-        np.array([instances.random_numbers(3, rng) for _ in range(2)]),
+        (instances.draw_whole_numbers(3, rng), instances.draw_whole_numbers(3, rng)),
+        np.array([instances.draw_whole_numbers(3, rng) for _ in range(2)]),
     )
     a, b = drawn.directions
     between = drawn.centres[1] - drawn.centres[0]
-    foot = observed_direction(DirectionSource("foot", (0, 1), (0,)), drawn)
+    foot = compute_observed_direction(DirectionSource("foot", (0, 1), (0,)), drawn)
     assert foot @ a == 0
     assert rank(np.array([foot, between, a])) == rank(np.array([between, a])) == 2
-    normal = observed_direction(DirectionSource("normal", (), (0, 1)), drawn)
+    normal = compute_observed_direction(DirectionSource("normal", (), (0, 1)), drawn)
     assert normal @ a == normal @ b == 0
-    assert rank(np.array([observed_direction(DirectionSource("between", (0, 1)), drawn), between])) == 1
+    assert rank(np.array([compute_observed_direction(DirectionSource("between", (0, 1)), drawn), between])) == 1
 
 
 def test_a_mechanism_without_centres() -> None:
@@ -171,7 +188,7 @@ def test_a_mechanism_without_centres() -> None:
     robot = builder.build(platform="two")
     start = ClosedConfiguration.of(PinocchioModel(robot), PinocchioModel(robot).q0)
     observation_model = ObservationModel("two", None, "base", robot.observations)
-    verdict = architecture_of(robot, observation_model, [start], relation(start, observation_model)).verdict(
+    verdict = build_architecture(robot, observation_model, [start], compute_relation(start, observation_model)).verdict(
         robot.observations
     )
     assert (verdict.exact, verdict.verdict, verdict.rank) == (True, BLIND, 0)
@@ -179,8 +196,8 @@ def test_a_mechanism_without_centres() -> None:
 
 def test_the_largest_rank_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     """An instance that is special by chance does not decide."""
-    generic = architecture.__wrapped__(setting_of("delta"))  # none that has instances already
-    real = instances.instance
+    generic = get_architecture.__wrapped__(setting_of("delta"))  # none that has instances already
+    real = instances.build_instance
     drawn: list[Instance] = []
 
     def unlucky(*geometry: object) -> Instance:
@@ -188,17 +205,17 @@ def test_the_largest_rank_counts(monkeypatch: pytest.MonkeyPatch) -> None:
         drawn.append(found)
         return found if len(drawn) > 1 else replace(found, rates=(found.rates[0], *(0 * r for r in found.rates[1:])))
 
-    monkeypatch.setattr("hrsynth.analysis.exact.instance", unlucky)
+    monkeypatch.setattr("hrsynth.analysis.exact.build_instance", unlucky)
     assert generic.verdict(generic.observations[:2]).rank == 3
-    assert len(drawn) == TESTS
+    assert len(drawn) == IDENTITY_INSTANCES_COUNT
     assert generic.verdict(generic.observations[:1]).rank == 2
-    assert len(drawn) == INSTANCES
+    assert len(drawn) == EXACT_RANK_INSTANCES_COUNT
 
 
 @given(st.lists(st.lists(st.integers(-3, 3), min_size=5, max_size=5), min_size=1, max_size=6))
 def test_kernels_are_exact(rows: list[list[int]]) -> None:
     matrix = np.array(rows, dtype=object)
-    basis = kernel(matrix)
+    basis = compute_exact_kernel(matrix)
     assert all(x == 0 for x in (matrix @ basis).ravel())
     assert basis.shape[1] == 5 - rank(matrix) == 5 - np.linalg.matrix_rank(np.array(rows, dtype=float))
     assert basis.shape[1] == (rank(basis) if basis.shape[1] else 0)
@@ -210,7 +227,7 @@ def check_agreement(mechanism: Mechanism) -> None:
         setup = ObservedRobot.of(mechanism, samples=3)
     except HrsynthError:
         assume(False)
-    generic = architecture(setup)
+    generic = get_architecture(setup)
     for places, observed in sets(setup):
         verdict = generic.verdict(observed)
         checked(verdict)
@@ -236,14 +253,14 @@ def spinning() -> ObservedRobot:
     robot = setting_of("delta").mechanism
     first, *rest = setting_of("delta").all_samples.observation_model.observations
     assert isinstance(first, Direction)
-    tilted = replace(first, direction=unit(first.direction + [0.3, -0.5, 0.4]))
+    tilted = replace(first, direction=normalise_vector(first.direction + [0.3, -0.5, 0.4]))
     return ObservedRobot.of(robot.changed(observations=(tilted, *rest)), samples=3)
 
 
 def test_directions_that_move_while_the_platform_rests() -> None:
     setup = spinning()
     assert setup.all_samples.members[0].relation.RI == 1
-    generic = architecture(setup)
+    generic = get_architecture(setup)
     for places, observed in sets(setup):
         verdict = generic.verdict(observed)
         assert verdict.exact
@@ -252,7 +269,7 @@ def test_directions_that_move_while_the_platform_rests() -> None:
 
 def test_what_some_legs_leave_free_must_be_the_robots_own() -> None:
     """Where the rates of two legs are exchanged, ρ for all legs has its dimension, for one of them it has not."""
-    generic = architecture(spinning())
+    generic = get_architecture(spinning())
     own = generic.relation
     order = [*range(6), *range(9, 12), *range(6, 9), *range(12, 15)]
     other = ExactArchitecture(
@@ -285,7 +302,7 @@ def test_many_random_robots(mechanism: Mechanism) -> None:
 )
 def test_other_segments_and_cameras(robot: str, observe: tuple[str, ...] | None, camera: str | None) -> None:
     setup = setting_of(robot, observe, camera)
-    verdict = architecture(setup).verdict(setup.observed)
+    verdict = get_architecture(setup).verdict(setup.observed)
     checked(verdict)
     assert verdict.exact, verdict.reason
     assert verdict.rank == max(member.relation.rank for member in setup.samples.members)
@@ -299,7 +316,7 @@ def check_refused(generic: ExactArchitecture, words: str) -> None:
     checked(verdict)
     assert not verdict.exact
     assert words in verdict.reason
-    with pytest.raises(NotRecognised):
+    with pytest.raises(RecognitionFailure):
         generic.instance(0)
 
 
@@ -307,12 +324,16 @@ def test_axes_that_are_not_quite_parallel() -> None:
     """A joint with its axis off by 1e-4 is locked: no planar robot any more, neither in fact nor in its instances."""
     robot = planar(["RRR"] * 3, np.random.default_rng(1), [{0}] * 3)
     observation_model = ObservedRobot.of(robot, samples=2).all_samples.observation_model
-    mobile = relation(ClosedConfiguration.of(PinocchioModel(robot), PinocchioModel(robot).q0), observation_model)
+    mobile = compute_relation(
+        ClosedConfiguration.of(PinocchioModel(robot), PinocchioModel(robot).q0), observation_model
+    )
     joint = robot.joints["joint_2_2"]
-    bent = robot.changed(joints=[replace(joint, axes=(unit(joint.axis + 1e-4 * np.array([0.3, -0.5, 0.7])),))])
+    bent = robot.changed(
+        joints=[replace(joint, axes=(normalise_vector(joint.axis + 1e-4 * np.array([0.3, -0.5, 0.7])),))]
+    )
     model = PinocchioModel(bent)
     start = ClosedConfiguration.of(model, model.q0)
-    check_refused(architecture_of(bent, observation_model, [start], mobile), "mobility is 3, but")
+    check_refused(build_architecture(bent, observation_model, [start], mobile), "mobility is 3, but")
     found = legs(bent)
     assert found.dof == 2
     assert all(each.exact and each.rank == other.rank for each, other in zip(found.exact, found.sets, strict=True))
@@ -326,7 +347,7 @@ def test_six_rods_that_meet_one_line() -> None:
     builder.link("platform", at=(0.1, 0.2, 1.0))
     for number in range(6):
         meet = np.array([0.0, 0.0, rng.uniform(-1, 2)])
-        along = unit(rng.normal(size=3))
+        along = normalise_vector(rng.normal(size=3))
         A, B = meet + rng.uniform(0.5, 1) * along, meet - rng.uniform(0.5, 1) * along
         builder.link(f"rod_{number}", at=A)
         builder.joint(f"foot_{number}", "S", "base", f"rod_{number}", A)
@@ -336,13 +357,13 @@ def test_six_rods_that_meet_one_line() -> None:
     model = PinocchioModel(robot)
     start = ClosedConfiguration.of(model, model.q0)
     observation_model = ObservationModel("platform", None, "base", robot.observations)
-    here = relation(start, observation_model)
+    here = compute_relation(start, observation_model)
     assert here.dof.value == 1
-    check_refused(architecture_of(robot, observation_model, [start], here), "mobility is 7, but 6")
+    check_refused(build_architecture(robot, observation_model, [start], here), "mobility is 7, but 6")
 
 
 def test_another_dof() -> None:
-    generic = architecture(setting_of("3rrr_m1"))
+    generic = get_architecture(setting_of("3rrr_m1"))
     basis = generic.relation.basis.copy()
     basis[:6] *= 0
     check_refused(
@@ -354,13 +375,13 @@ def test_another_dof() -> None:
 
 
 def test_gears_are_said_to_be_left_out() -> None:
-    generic = architecture(setting_of("3rrr_m1"))
+    generic = get_architecture(setting_of("3rrr_m1"))
     geared = replace(generic.mechanism, couplings=(Coupling("gear", "prox_1", "prox_2", 2.0),))
     check_refused(ExactArchitecture(geared, generic.relations, generic.observations, generic.relation), "couplings")
 
 
 def test_relations_that_leave_no_direction() -> None:
-    generic = architecture(setting_of("rrrrr_m1"))
+    generic = get_architecture(setting_of("rrrrr_m1"))
     crowded = replace(generic.relations, tower=(*generic.relations.tower, (), ((1,),), ((0,), (1,), (2,))))
     check_refused(
         ExactArchitecture(generic.mechanism, crowded, generic.observations, generic.relation), "no random direction"
@@ -370,7 +391,7 @@ def test_relations_that_leave_no_direction() -> None:
 def test_what_is_no_direction() -> None:
     setup = setting_of("delta")
     joint = next(joint for joint in setup.mechanism.joints.values() if joint.type.value == "R")
-    verdict = architecture(setup).verdict(encoders(setup.mechanism, joint, "1"))
+    verdict = get_architecture(setup).verdict(make_encoders(setup.mechanism, joint, "1"))
     checked(verdict)
     assert not verdict.exact
     assert "not a direction" in verdict.reason
@@ -378,14 +399,14 @@ def test_what_is_no_direction() -> None:
 
 @pytest.mark.parametrize(("robot", "kept"), [("quattro_rigid", "zero"), ("i4l", "parallel")])
 def test_an_over_constrained_robot_needs_its_incidences(robot: str, kept: str) -> None:
-    generic = architecture(setting_of(robot))
+    generic = get_architecture(setting_of(robot))
     fewer = tuple(each for each in generic.relations.incidences if each.kind == kept and len(each.terms) == 2)
     relations = replace(generic.relations, incidences=fewer)
     check_refused(ExactArchitecture(generic.mechanism, relations, generic.observations, generic.relation), "mobility")
 
 
 def test_a_planar_robot_needs_its_parallel_axes() -> None:
-    generic = architecture(setting_of("3rrr_m1"))
+    generic = get_architecture(setting_of("3rrr_m1"))
     axes = {name: (i,) for i, name in enumerate(generic.relations.axes)}
     relations = replace(generic.relations, axes=axes, tower=((),) * len(axes))
     check_refused(
@@ -416,7 +437,7 @@ def test_a_robot_may_see_less_than_its_architecture() -> None:
     assert record["verdict"] == PARTIAL
     assert record["architecture"]["verdict"] == CONTROLLABLE
     assert record["architecture"]["exact"] is True
-    (row,) = [row for row in re.split(r"\n(?=\S)", text.derivation(found)) if row.startswith("architecture")]
+    (row,) = [row for row in re.split(r"\n(?=\S)", text.format_derivation(found)) if row.startswith("architecture")]
     line = " ".join(row.split())
     assert "rank 6 of 6 for generic geometry" in line
     assert "5 for this robot" in line
@@ -452,7 +473,7 @@ def test_the_architecture_in_a_derivation(robot: str, observe: None, verdict: st
         "instances": 1 if verdict == CONTROLLABLE else 5,
         "reason": words.split(", ", 1)[1],
     }
-    (row,) = [row for row in re.split(r"\n(?=\S)", text.derivation(found)) if row.startswith("architecture")]
+    (row,) = [row for row in re.split(r"\n(?=\S)", text.format_derivation(found)) if row.startswith("architecture")]
     line = " ".join(row.split())
     assert line.split(maxsplit=1)[1] == words
 
@@ -465,38 +486,38 @@ def test_the_architecture_in_a_table_of_legs() -> None:
         assert each["architecture"]["verdict"] == each["verdict"]
         assert each["architecture"]["rank"] == each["rank"]
         assert tuple(each["legs"]) == exact.legs
-    lines = text.legs(found).splitlines()
+    lines = text.format_legs(found).splitlines()
     (header,) = [line for line in lines if line.split()[:1] == ["legs"]]
     assert "exact" in header.split()
     assert sum("proved" in line for line in lines) == sum(each.verdict == CONTROLLABLE for each in found.sets) == 9
     assert sum("5 instances" in line for line in lines) == 6
     assert "exact except for a chance below 1e-14: identities tested at random instances" in lines
-    assert not any("chance" in line for line in text.legs(legs(prepare_robot("3rrr_m1"))).splitlines())
+    assert not any("chance" in line for line in text.format_legs(legs(prepare_robot("3rrr_m1"))).splitlines())
 
 
 @pytest.fixture
 def none_remembered() -> Iterator[None]:
     """Architectures of this test alone: what is patched in them is not met by another."""
-    architecture.cache_clear()
+    get_architecture.cache_clear()
     yield
-    architecture.cache_clear()
+    get_architecture.cache_clear()
 
 
 @pytest.mark.usefixtures("none_remembered")
 def test_what_is_not_decided_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     def crowded(*_: object) -> Instance:
-        raise NotRecognised("crowded")
+        raise RecognitionFailure("crowded")
 
-    monkeypatch.setattr("hrsynth.analysis.exact.instance", crowded)
+    monkeypatch.setattr("hrsynth.analysis.exact.build_instance", crowded)
     found = legs(prepare_robot("rrrrr_m1"))
     assert not any(each.exact for each in found.exact)
     assert [each["architecture"]["verdict"] for each in found.to_dict()["sets"]] == [None] * 3
-    printed = text.legs(found)
+    printed = text.format_legs(found)
     assert printed.count("undecided") == 4
     assert "undecided in exact arithmetic: crowded" in printed
     line = next(
         line
-        for line in text.derivation(derive(prepare_robot("rrrrr_m1"))).splitlines()
+        for line in text.format_derivation(derive(prepare_robot("rrrrr_m1"))).splitlines()
         if line.startswith("architecture")
     )
     assert line.endswith("undecided: crowded")
@@ -505,5 +526,5 @@ def test_what_is_not_decided_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_numbers_drawn_are_many() -> None:
     """Two that should differ are equal by chance once in a million draws."""
     rng = random.Random(0)
-    drawn = [instances.random_numbers(3, rng) for _ in range(200)]
+    drawn = [instances.draw_whole_numbers(3, rng) for _ in range(200)]
     assert len({int(x.p) for vector in drawn for x in vector}) == 600

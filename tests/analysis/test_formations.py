@@ -20,22 +20,22 @@ import numpy as np
 import pytest
 
 from hrsynth.analysis.check import check
-from hrsynth.analysis.controllability import _smallest, legs
+from hrsynth.analysis.controllability import _find_smallest_sets, legs
 from hrsynth.analysis.derive import Derivation, derive
 from hrsynth.analysis.pose_requests import observe
 from hrsynth.analysis.singularity.singularities import singularities
 from hrsynth.certificates import certificate, verify
 from hrsynth.description import load, native, save
 from hrsynth.errors import BadRequest, BadRobotFile
-from hrsynth.families.formations import MOVES, formation
-from hrsynth.geometry.vectors import Array, pose
+from hrsynth.families.formations import MOVES, build_formation
+from hrsynth.geometry.vectors import Array, build_pose
 from hrsynth.mechanism.cameras import NamedCamera
 from hrsynth.mechanism.model import Mechanism
 from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.mechanism.observations.point import ImagePoint
 from hrsynth.present.show import text
 from hrsynth.present.text.sentences import describe_seen
-from hrsynth.present.text.tables import LINE, head
+from hrsynth.present.text.tables import LINE, format_head_rows
 from strategies import random_rotation
 
 Pairs = Sequence[tuple[int, int]]
@@ -80,7 +80,7 @@ def drawn(n: int, bodies: str, bearings: Pairs, distances: Pairs = (), seed: int
         places[:, 2] = 0.3
     places = places @ frame.T
     turns = [random_rotation(rng) for _ in range(n)]
-    made = formation(places, bearings, distances, bodies=bodies, turns=turns, frame=frame)
+    made = build_formation(places, bearings, distances, bodies=bodies, turns=turns, frame=frame)
     return made, places, frame
 
 
@@ -133,7 +133,7 @@ def test_generic_ranks_of_complete_formations_are_those_of_the_literature(bodies
 def test_trivial_motions_have_names(bodies: str, names: list[str]):
     rng = np.random.default_rng(1)
     places = rng.normal(size=(3, 3)) * (1, 1, 0 if bodies == "plane" else 1)
-    found = derive(formation(places, list(permutations((1, 2, 3), 2)), bodies=bodies)).verdict.formation
+    found = derive(build_formation(places, list(permutations((1, 2, 3), 2)), bodies=bodies)).verdict.formation
     assert found is not None
     assert list(found.trivial) == names
 
@@ -238,7 +238,7 @@ def test_a_camera_of_the_ground_leaves_a_scale_about_it():
     """The first body moves along its ray, all others with it; the rest scales about the first: no similarity that keeps
     the ground's camera where it is."""
     made, _places, _frame = drawn(3, "position", list(combinations((1, 2, 3), 2)))
-    eye = NamedCamera("eye", "ground", pose((1.0, 2.0, 3.0)))
+    eye = NamedCamera("eye", "ground", build_pose((1.0, 2.0, 3.0)))
     made = replace(
         made,
         cameras=(*made.cameras, eye),
@@ -272,7 +272,7 @@ def test_the_search_for_the_smallest_sets_is_that_of_all_sets(seed: int):
 
     labels, whole = tuple(blocks), rank_of(tuple(blocks))
     sets = [each for size in range(1, 9) for each in combinations(labels, size) if rank_of(each) == whole]
-    assert _smallest(labels, rank_of) == ([each for each in sets if len(each) == len(sets[0])], True)
+    assert _find_smallest_sets(labels, rank_of) == ([each for each in sets if len(each) == len(sets[0])], True)
 
 
 @pytest.mark.slow
@@ -317,7 +317,7 @@ def test_a_formation_on_one_line_is_singular_and_told_so():
     pairs = list(combinations((1, 2, 3), 2))
     lost = 5 - rank(rigidity_matrix(places, np.eye(3), "position", pairs))
     assert lost == 1
-    posture = check(formation(places, pairs, bodies="position")).postures[0]
+    posture = check(build_formation(places, pairs, bodies="position")).postures[0]
     assert posture.hidden.state == "type2"
     assert posture.hidden.singularity_indices is not None
     assert lost == posture.hidden.singularity_indices.RO
@@ -351,7 +351,7 @@ def test_round_trips(tmp_path, ending: str, bodies: str):
 @pytest.mark.parametrize("bodies", ["free", "position"])
 def test_the_hidden_robot_of_a_ring_is_read_again(tmp_path, bodies: str):
     """What its file says stands on the ground: it is a robot with the first body as its platform."""
-    made = formation([(0, 0, 0), (1, 0, 0), (0.5, 0.9, 0.2)], [(1, 2), (2, 3), (3, 1)], bodies=bodies)
+    made = build_formation([(0, 0, 0), (1, 0, 0), (0.5, 0.9, 0.2)], [(1, 2), (2, 3), (3, 1)], bodies=bodies)
     hidden = derive(made).hidden
     assert hidden is not None
     save(hidden, tmp_path / "hidden.urdf")
@@ -421,7 +421,7 @@ def test_the_file_of_the_page_is_a_formation(page: str):
     assert found.formation
     assert found.bodies == ("b1", "b2", "b3", "b4")
     assert len(found.observations) == 10
-    observed = dict(head(observe(found)))["observed"]
+    observed = dict(format_head_rows(observe(found)))["observed"]
     assert len(observed) > 1
     assert max(map(len, observed)) <= LINE
     assert all(line.endswith(",") for line in observed[:-1])
@@ -458,9 +458,9 @@ def test_other_questions_refuse_formations_in_one_line():
     with pytest.raises(BadRequest, match="formation"):
         singularities(drawn(3, "position", [(1, 2), (2, 3), (1, 3)])[0])
     with pytest.raises(BadRequest, match="two of 1 to 3"):
-        formation(np.eye(3), [(1, 4)])
+        build_formation(np.eye(3), [(1, 4)])
     with pytest.raises(BadRequest, match="yaw"):
-        formation(np.eye(3), bodies="round")
+        build_formation(np.eye(3), bodies="round")
 
 
 def test_the_certificate_of_ranks_holds():

@@ -21,7 +21,7 @@ from hrsynth.errors import BadRequest, BadRobotFile
 from hrsynth.geometry.vectors import Array
 from hrsynth.mechanism import Direction, Mechanism
 from hrsynth.mechanism.builder import Builder
-from hrsynth.tolerances import RANK_GAP
+from hrsynth.tolerances import RANK_GAP_MIN
 from kinematics.robots import setting_of, state_of
 from oracle import Oracle
 
@@ -65,7 +65,7 @@ def test_all_sets_obey(robot: str) -> None:
     assert len(sets) == 2 ** len(labels) - 1
     for chosen, verdict in sets.items():
         assert verdict.dof == answer.dof
-        assert verdict.gap > RANK_GAP
+        assert verdict.gap > RANK_GAP_MIN
         assert verdict.rank + len(verdict.unobserved) == answer.dof
         assert verdict.verdict == (CONTROLLABLE if verdict.rank == answer.dof else PARTIAL if verdict.rank else BLIND)
         for fewer in combinations(chosen, len(chosen) - 1):

@@ -12,13 +12,13 @@ from jsonschema import Draft202012Validator
 
 import hrsynth
 from hrsynth.analysis.check import Check, LoopCheck
-from hrsynth.cli import execute
-from hrsynth.cli.schema import schema
+from hrsynth.cli import run_command
+from hrsynth.cli.schema import build_schema
 from hrsynth.description import list_robots, load, save
 from hrsynth.description.assembly.choices import choices
 from hrsynth.description.overrides import Overrides
 from hrsynth.errors import BadRequest, NoPlatform, NoSegment
-from hrsynth.index import analyses
+from hrsynth.index import list_analyses
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.model import PlatformChoice
 from oracle import Oracle
@@ -123,7 +123,7 @@ GIVEN: dict[str, dict[str, object]] = {
 """What questions cannot be asked without."""
 
 
-@pytest.mark.parametrize("command", sorted(analyses().keys() - {"check", "view"}))
+@pytest.mark.parametrize("command", sorted(list_analyses().keys() - {"check", "view"}))
 def test_every_other_question_asks_for_the_platform(command: str):
     for robot in (opened("3rrr_m1"), load(tree(2, 2))):
         with pytest.raises(NoPlatform, match="Choose it with --platform LINK"):
@@ -136,7 +136,7 @@ def test_motors_are_proposed_where_none_is_driven(name: str, tmp_path: Path, cap
     """Of these robots the motors are those proposed; ``derive``, ``check`` and ``export`` tell them in one line."""
     robot = load(name)
     still = replace(robot, joints={name: replace(joint, motor=None) for name, joint in robot.joints.items()})
-    names = [joint.name for joint in robot.joints.values() if joint.actuated]
+    names = [joint.name for joint in robot.joints.values() if joint.is_actuated]
     assert robot.proposed_motors is None
     assert still.proposed_motors == f"no joint has a motor: try --motors {','.join(names)} (the joints at the base)"
     save(still, tmp_path / "still.urdf")
@@ -144,7 +144,7 @@ def test_motors_are_proposed_where_none_is_driven(name: str, tmp_path: Path, cap
     for command, status in (("derive", 0), ("check", 0), ("export", 2)):
         capsys.readouterr()
         output = ["-o", str(tmp_path / "code.hpp")] if command == "export" else []
-        assert execute([command, str(tmp_path / "still.urdf"), *output]) == status
+        assert run_command([command, str(tmp_path / "still.urdf"), *output]) == status
         assert [told in line for line in capsys.readouterr().err.splitlines()].count(True) == 1
     found = choices(tmp_path / "still.urdf", Overrides())
     assert found.proposed_motors == names
@@ -164,13 +164,13 @@ def test_a_platform_that_is_named_makes_it_the_whole_answer(tmp_path: Path, caps
     path.write_text(tree(2, 3))
     for options, kind in (([], "constraints"), (["--platform", "l0_2"], "configurations")):
         capsys.readouterr()
-        assert execute(["check", str(path), *options, "--json"]) == 0
+        assert run_command(["check", str(path), *options, "--json"]) == 0
         record = json.loads(capsys.readouterr().out)
         assert kind in record
-        assert list(Draft202012Validator(schema("check")).iter_errors(record)) == []
+        assert list(Draft202012Validator(build_schema("check")).iter_errors(record)) == []
         assert (record["platform"]["link"] is None) is (not options)
         less = {name: value for name, value in record.items() if name != kind}
-        assert list(Draft202012Validator(schema("check")).iter_errors(less)) != []
+        assert list(Draft202012Validator(build_schema("check")).iter_errors(less)) != []
     assert isinstance(hrsynth.check(load(path, platform="l0_2")), Check)
 
 
@@ -207,6 +207,6 @@ def test_the_json_of_what_needs_no_platform_is_what_its_schema_says(
     path.write_text(text)
     more = {"convert": [str(tmp_path / "robot.xml")], "view": ["--static", str(tmp_path / "view.html")]}
     capsys.readouterr()
-    assert execute([command, str(path), *more.get(command, []), "--json"]) == 0
+    assert run_command([command, str(path), *more.get(command, []), "--json"]) == 0
     record = json.loads(capsys.readouterr().out)
-    assert list(Draft202012Validator(schema(command)).iter_errors(record)) == []
+    assert list(Draft202012Validator(build_schema(command)).iter_errors(record)) == []

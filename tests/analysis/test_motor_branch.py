@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from hrsynth import branch, load, modes
 from hrsynth.analysis.branch.answer import BranchProof
-from hrsynth.analysis.branch.cells import _weakest
-from hrsynth.analysis.branch.growth import CellGrid, lattice
+from hrsynth.analysis.branch.cells import _bound_smallest_value
+from hrsynth.analysis.branch.growth import CellGrid, split_box
 from hrsynth.errors import BadRequest, MotorsNotEnough
-from hrsynth.geometry.affine import AffineForms, affine
+from hrsynth.geometry.affine import AffineForms, make_affine
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Limits, Mechanism
 from strategies import random_rotation, spherical
@@ -151,7 +151,7 @@ def test_forms_enclose(seed):
     rng = np.random.default_rng(seed)
 
     def form() -> AffineForms:
-        return affine(rng.normal(size=50), 0.3 * rng.normal(size=(50, 3)), 0.1 * np.abs(rng.normal(size=50)))
+        return make_affine(rng.normal(size=50), 0.3 * rng.normal(size=(50, 3)), 0.1 * np.abs(rng.normal(size=50)))
 
     a, b, c = form(), form(), form()
     sine, cosine = (a + b).sines()
@@ -246,7 +246,7 @@ SLOW = pytest.mark.slow
 )
 def test_tubes_hold_what_small_steps_find(name, half):
     robot = load(name)
-    box = {joint.name: (-half, half) for joint in robot.joints.values() if joint.actuated}
+    box = {joint.name: (-half, half) for joint in robot.joints.values() if joint.is_actuated}
     proof = branch(robot, box, max_cells=100)
     assert proof.parts[0].volume_fraction == 1.0
     assert obeys(proof, np.random.default_rng(1), 3, 6) == 18
@@ -275,7 +275,7 @@ def test_a_lattice_fills_the_box_about_its_start(data, n, most):
 
     low, high, half = -some(0, 5), some(0.1, 5), some(1e-4, 2)
     grid = CellGrid(low, high)
-    cells = lattice(grid, np.zeros(n), half, most)
+    cells = split_box(grid, np.zeros(n), half, most)
     corners = np.array([(cell.low, cell.high) for cell in cells])
     assert sum(math.prod((b - a).tolist()) for a, b in corners) == 2 ** (40 * n)
     inner = np.minimum(corners[:, None, 1], corners[None, :, 1]) - np.maximum(corners[:, None, 0], corners[None, :, 0])
@@ -341,7 +341,7 @@ def test_limits_that_limit_nothing_are_a_whole_turn():
     """As some exporters write for a joint without limits."""
     robot = four_bar(coupler=5.0, rocker=5.0)
     wide = robot.changed(
-        joints=[replace(joint, limits=Limits(-1e9, 1e9)) for joint in robot.joints.values() if joint.actuated]
+        joints=[replace(joint, limits=Limits(-1e9, 1e9)) for joint in robot.joints.values() if joint.is_actuated]
     )
     found = branch(wide, max_cells=2)
     assert found.box == "a full turn"
@@ -373,7 +373,7 @@ def test_a_truss_on_the_way_stays_as_it_is():
     for name in (*robot.links, "one", "two"):
         b.link(name)
     for joint in robot.joints.values():
-        b.joint(joint.name, "R", *joint.links, at=joint.point, axis=Z, motor=joint.actuated, loop=not joint.in_tree)
+        b.joint(joint.name, "R", *joint.links, at=joint.point, axis=Z, motor=joint.is_actuated, loop=not joint.in_tree)
     b.joint("t1", "R", "rocker", "one", (1.2, 0.2, 0), axis=Z)
     b.joint("t2", "R", "rocker", "two", (1.4, 0.5, 0), axis=Z)
     b.joint("t3", "R", "one", "two", (1.5, 0.1, 0), axis=Z, loop=True)
@@ -435,7 +435,7 @@ def test_the_smallest_singular_value_is_bounded_whatever_the_tubes_widths():
     M = rng.uniform(0, 0.2, (200, 4, 4)) * np.minimum(1.0, r[:, :, None] / r[:, None, :])
     E = M * rng.uniform(-1, 1, M.shape)
     exact = np.linalg.svd(np.linalg.solve(Y, np.eye(4) - E), compute_uv=False)[:, -1]
-    bound = _weakest(Y, M, r, (M @ r[..., None])[..., 0])
+    bound = _bound_smallest_value(Y, M, r, (M @ r[..., None])[..., 0])
     assert np.all(bound <= exact)
     assert np.median(bound / exact) > 0.3
 

@@ -10,21 +10,21 @@ import pytest
 
 from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.derive import Derivation, derive
-from hrsynth.analysis.exact import architecture
+from hrsynth.analysis.exact import get_architecture
 from hrsynth.analysis.observed import ObservedRobot, restrict_samples
-from hrsynth.analysis.verdict import verdict_of
+from hrsynth.analysis.verdict import compute_verdict
 from hrsynth.description import list_robots, load, native
-from hrsynth.errors import BadRequest, RankUndecided, UndefinedValue
-from hrsynth.geometry.vectors import Array, pose, transform
+from hrsynth.errors import BadRequest, UndecidedRank, UndefinedValue
+from hrsynth.geometry.vectors import Array, build_pose, transform
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Mechanism
-from hrsynth.mechanism.observations import kinds
-from hrsynth.tolerances import SAME_RELATION
+from hrsynth.mechanism.observations import list_kinds
+from hrsynth.tolerances import RELATION_ANGLE_TOL
 from kinematics.robots import ROBOTS
 from oracle import exponential
 from strategies import pods, random_direction, random_rotation, transformed
 
-KINDS = sorted(kinds())
+KINDS = sorted(list_kinds())
 POINTS = [f"point:platform@{at}" for at in ("0.1,0,0", "-0.1,0.1,0", "0,0.1,0.1", "0.05,-0.1,0")]
 
 
@@ -60,7 +60,7 @@ def spatial() -> Mechanism:
 
 def asked(mechanism: Mechanism, kind: str, rng: np.random.Generator) -> list[str]:
     """Observations of a kind: of the platform from the base, and (all but encoders) of the base from the platform."""
-    needs = kinds()[kind].needs
+    needs = list_kinds()[kind].needs
     if "joint" in needs:
         joint = next(j for j in mechanism.joints.values() if j.type in ("R", "P", "U", "C"))
         return [f"encoder:{joint.name}"]
@@ -82,7 +82,7 @@ def watched(mechanism: Mechanism, kind: str) -> ObservedRobot:
     cameras = []
     for name, link in (("eye", mechanism.base), ("hand", mechanism.platform)):
         centre = mechanism.links[mechanism.platform].pose[:3, 3] + far * random_direction(rng)
-        local = np.linalg.inv(mechanism.links[link].pose) @ pose(centre)
+        local = np.linalg.inv(mechanism.links[link].pose) @ build_pose(centre)
         cameras.append(f"{name}={link}@" + ",".join(map(str, local[:3, 3])) + "/0.3,-0.2,0.1")
     return ObservedRobot.of(mechanism, camera=cameras, sensor=asked(mechanism, kind, rng), samples=5)
 
@@ -92,7 +92,7 @@ def certified(mechanism: Mechanism, kind: str, form: str = "simplified") -> Deri
     setup = watched(mechanism, kind)
     found = derive(setup, form=form)
     assert found.equivalence.passed
-    assert found.equivalence.largest_angle < SAME_RELATION
+    assert found.equivalence.largest_angle < RELATION_ANGLE_TOL
     lifts = [step for step in found.steps if step.rule == "lift"]
     assert lifts
     assert all(step.accepted for step in lifts)
@@ -124,7 +124,7 @@ def test_exact_ranks_are_those_of_samples(robot: str, kind: str) -> None:
     setup = watched(
         {"free_body": free_body, "arm": arm}[robot]() if robot in ("free_body", "arm") else load(robot), kind
     )
-    exact = architecture(setup)
+    exact = get_architecture(setup)
     for observed in (setup.observed, setup.observed[:1]):
         found = exact.verdict(observed)
         if kind == "edge":
@@ -133,8 +133,8 @@ def test_exact_ranks_are_those_of_samples(robot: str, kind: str) -> None:
         assert found.exact, found.reason
         try:
             samples = restrict_samples(setup.all_samples, observed)
-            assert found.rank == verdict_of(setup, [o.leg for o in observed], samples).rank
-        except RankUndecided:  # a circle far away hardly shows how it is turned
+            assert found.rank == compute_verdict(setup, [o.leg for o in observed], samples).rank
+        except UndecidedRank:  # a circle far away hardly shows how it is turned
             assert (kind, found.rank) == ("image_circle", min(5 * len(observed), found.dof))
         assert found.proved is (found.rank == found.dof)
 
@@ -220,7 +220,7 @@ def test_verdicts_agree_with_pixels_of_the_arm(count: int) -> None:
         D = np.eye(4)
         for joint, angle in zip(robot.joints.values(), angles, strict=True):
             R = exponential(angle * joint.axis)
-            D = D @ pose(joint.point - R @ joint.point, R)
+            D = D @ build_pose(joint.point - R @ joint.point, R)
         seen = [np.linalg.inv(D @ hand) @ point for point in points]
         return np.concatenate([each[:2] / each[2] for each in seen])
 
@@ -271,10 +271,10 @@ def circumcircle(points: Array) -> tuple[Array, float, Array]:
 
 def smallest(points: Array, cameras: Array) -> Array:
     """The smallest singular value of the rates of three image points of a free body, for each camera centre."""
-    kind, V, found = kinds()["point"], np.eye(6), []
+    kind, V, found = list_kinds()["point"], np.eye(6), []
     seen = [kind("p", "l", at=point) for point in points]  # type: ignore[call-arg]
     for C in cameras:
-        _, rates = kind.together(seen, pose(C), np.array([pose()] * 3), np.zeros((6, 6)), np.array([V] * 3))
+        _, rates = kind.together(seen, build_pose(C), np.array([build_pose()] * 3), np.zeros((6, 6)), np.array([V] * 3))
         found.append(np.linalg.svd(rates, compute_uv=False)[5])
     return np.array(found)
 

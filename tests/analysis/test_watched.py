@@ -10,12 +10,12 @@ import pytest
 from hrsynth import check, derive, legs, select
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load
-from hrsynth.geometry.so3 import exponential
+from hrsynth.geometry.so3 import convert_vectors_to_rotations
 from hrsynth.mechanism.legs import decompose
-from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.normal import reduce_to_normal_form
 from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.mechanism.pose import Pose
-from hrsynth.mechanism.sensors import defaults_of
+from hrsynth.mechanism.sensors import list_default_segments
 from oracle import Oracle
 
 WHY = {
@@ -91,7 +91,7 @@ def test_the_table_of_legs_says_where_freedoms_are_lost():
 def test_half_a_turn_is_printed_as_a_positive_one():
     for angle in (-math.pi + 1e-9, math.pi - 1e-9):
         turned = np.eye(4)
-        turned[:3, :3] = exponential(np.array([0.0, 0.0, angle]))
+        turned[:3, :3] = convert_vectors_to_rotations(np.array([0.0, 0.0, angle]))
         assert str(Pose.of(turned)) == "x=0,y=0,z=0,rpy=0/0/3.141593"
         motion = ObservedRobot.of("3rrr_m1").telling([Pose.parse("phi=10deg")]).motion
         assert str(motion.pose(turned @ motion.home)).endswith("phi=180deg")
@@ -125,8 +125,8 @@ def with_connectors(skew: float, short: float, seed: int) -> str:
 def test_a_connector_of_no_length_is_never_watched(skew: float, short: float, tmp_path):
     (tmp_path / "robot.xml").write_text(with_connectors(skew, short, 5))
     robot = load(tmp_path / "robot.xml", platform="plate")
-    for number, leg in enumerate(decompose(normal_form(robot).mechanism).legs):
-        seen = defaults_of(decompose(normal_form(robot).mechanism))[leg.label]
+    for number, leg in enumerate(decompose(reduce_to_normal_form(robot).mechanism).legs):
+        seen = list_default_segments(decompose(reduce_to_normal_form(robot).mechanism))[leg.label]
         assert isinstance(seen, Direction)
         assert seen.link == f"rod{number}"
         origins = [robot.links[link].pose for link in (f"rod{number}", f"e{number}")]

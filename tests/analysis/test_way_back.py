@@ -178,7 +178,7 @@ def test_a_motor_that_the_platform_does_not_feel_is_not_led_back_to():
 def test_motors_of_shipped_robots_are_functions_of_the_pose(name, half):
     """Poses of different motors differ, by small steps of plain NumPy."""
     robot = load(name)
-    proof = branch(robot, {joint.name: (-half, half) for joint in robot.joints.values() if joint.actuated})
+    proof = branch(robot, {joint.name: (-half, half) for joint in robot.joints.values() if joint.is_actuated})
     assert proof.regular
     assert proof.injective_box is not None
     np.testing.assert_array_equal(proof.injective_box, proof.proved)

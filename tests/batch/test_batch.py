@@ -13,15 +13,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.analysis.singularity_indices import interaction_matrix
+from hrsynth.analysis.singularity_indices import compute_interaction_matrix
 from hrsynth.batch.engine import Batch, Evaluation
 from hrsynth.batch.iterative_leg import IterativeLeg
-from hrsynth.batch.leg_wrenches import freedoms
+from hrsynth.batch.leg_wrenches import compute_free_twists
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, HrsynthError, MissingExtra
 from hrsynth.geometry.vectors import Array
-from hrsynth.kinematics.velocity_relation import relation
-from hrsynth.kinematics.walking import random_walk
+from hrsynth.kinematics.velocity_relation import compute_relation
+from hrsynth.kinematics.walking import walk_randomly
 from hrsynth.mechanism.observations.direction import Direction
 from kinematics.robots import ROBOTS
 from strategies import parallel_robots
@@ -43,7 +43,7 @@ def shipped_batch(robot: str) -> tuple[ObservedRobot, Batch]:
 
 def poses_near(batch: Batch, count: int, size: float = 0.2, seed: int = 0) -> Array:
     """Poses of the platform's own freedoms around its home."""
-    from hrsynth.geometry.so3 import exponential
+    from hrsynth.geometry.so3 import convert_vectors_to_rotations
 
     rng = np.random.default_rng(seed)
     coordinates = batch.coordinates
@@ -51,7 +51,7 @@ def poses_near(batch: Batch, count: int, size: float = 0.2, seed: int = 0) -> Ar
     spins = rng.uniform(-size, size, (count, coordinates.rotations.shape[1])) @ coordinates.rotations.T
     shifts = rng.uniform(-size, size, (count, coordinates.translations.shape[1])) @ coordinates.translations.T
     X[:, :3, 3] += batch.length * shifts
-    X[:, :3, :3] = exponential(spins) @ X[:, :3, :3]
+    X[:, :3, :3] = convert_vectors_to_rotations(spins) @ X[:, :3, :3]
     return X
 
 
@@ -67,15 +67,15 @@ def check_law(setup: ObservedRobot, legs: Sequence[str], count: int, seed: int =
         if isinstance(o, Direction) and o.leg in legs
     )
     observation_model = replace(all_samples.observation_model, observations=watched)
-    walk = list(random_walk(all_samples.start, count, seed=seed, steps=4))
+    walk = list(walk_randomly(all_samples.start, count, seed=seed, steps=4))
     found = batch.evaluate([at.pose(observation_model.platform) for at in walk], [o.leg for o in watched])
     compared = 0
     for i, at in enumerate(walk):
         u = np.array([at.pose(o.link)[:3, :3] @ o.direction for o in watched])
         if not found.reached[i] or np.max(np.abs(u - found.directions[i])) > 1e-3:
             continue
-        theirs = relation(at, observation_model)
-        M = interaction_matrix(theirs)
+        theirs = compute_relation(at, observation_model)
+        M = compute_interaction_matrix(theirs)
         if M is None:
             continue
         scale = float(np.linalg.norm(M, 2)) if M.any() else 1.0
@@ -96,8 +96,8 @@ def check_law(setup: ObservedRobot, legs: Sequence[str], count: int, seed: int =
 def test_a_batch_is_the_relation_at_every_pose(robot: str) -> None:
     setup, batch = shipped_batch(robot)
     known = [name for name, leg in batch.legs.items() if leg is not None]
-    assert batch.complete or robot == "i4l"
-    assert batch.coordinates.constant == (robot not in SOLVED) == (not batch.holds)
+    assert batch.is_complete or robot == "i4l"
+    assert batch.coordinates.has_constant_twists == (robot not in SOLVED) == (not batch.holds)
     assert not batch.iterative
     assert check_law(setup, known, POSES) >= POSES // 2
     assert check_law(setup, known[-2:], 3) >= 1
@@ -109,7 +109,7 @@ def test_what_legs_forbid_in_closed_form_is_what_their_joints_forbid(robot: str)
     setup, batch = shipped_batch(robot)
     mechanism, decomposition = setup.mechanism, setup.decomposition
     seen = dict(zip(decomposition.labels, setup.segments, strict=True))
-    X = np.array([at.pose(mechanism.platform) for at in random_walk(setup.all_samples.start, 12, seed=5, steps=4)])
+    X = np.array([at.pose(mechanism.platform) for at in walk_randomly(setup.all_samples.start, 12, seed=5, steps=4)])
     chains = [IterativeLeg.of(mechanism, leg, seen[leg.label], None) for leg in decomposition.legs]  # type: ignore[arg-type]
     rows = np.concatenate(
         [each.follow_from_zero(batch.coordinates, batch.home, X, batch.span).wrenches() for each in chains], axis=1
@@ -125,7 +125,7 @@ def test_freedoms_are_normal_to_all_rows_and_never_turn_over() -> None:
     rng = np.random.default_rng(1)
     for k, D in ((1, 3), (2, 3), (3, 6), (5, 6)):
         rows = rng.normal(size=(k, D, 50))
-        basis, least = freedoms(rows)
+        basis, least = compute_free_twists(rows)
         whole = np.concatenate([rows, basis.swapaxes(0, 1)]).transpose(2, 0, 1)
         assert np.max(np.abs(np.einsum("kdn,din->kin", rows, basis))) < 1e-12
         assert np.max(np.abs(np.einsum("din,djn->nij", basis, basis) - np.eye(D - k))) < 1e-12
@@ -133,10 +133,10 @@ def test_freedoms_are_normal_to_all_rows_and_never_turn_over() -> None:
         values = np.linalg.svd(rows.transpose(2, 0, 1), compute_uv=False)
         assert np.all(values[:, -1] <= least * (1 + 1e-12))
     angle = np.linspace(0.0, 2 * np.pi, 721)
-    basis, _ = freedoms(np.array([[np.cos(angle), np.sin(angle), 0.3 + 0 * angle]]))
+    basis, _ = compute_free_twists(np.array([[np.cos(angle), np.sin(angle), 0.3 + 0 * angle]]))
     sense = np.einsum("in,in->n", np.cross(basis[:, 0].T, basis[:, 1].T).T, [np.cos(angle), np.sin(angle), 0 * angle])
     assert np.all(sense > 0) or np.all(sense < 0)
-    assert freedoms(np.zeros((1, 3, 2)))[1] == pytest.approx([0.0, 0.0], abs=1e-100)
+    assert compute_free_twists(np.zeros((1, 3, 2)))[1] == pytest.approx([0.0, 0.0], abs=1e-100)
 
 
 @pytest.mark.parametrize("robot", ["3rps", "rrrrr_m1"])
@@ -245,7 +245,7 @@ def test_threads_change_no_digit(monkeypatch: pytest.MonkeyPatch) -> None:
     X = poses_near(batch, 10_000, 0.6)
     found = []
     for count in (1, 3):
-        monkeypatch.setattr("hrsynth.batch.program.threads", lambda count=count: count)
+        monkeypatch.setattr("hrsynth.batch.program.count_threads", lambda count=count: count)
         found.append(batch.evaluate(X, ["1", "4"], 0.01, compiled=True))
     one, several = found
     assert one.position is not None
@@ -309,7 +309,7 @@ def test_a_lost_freedom_has_an_infinite_error_and_the_others_a_finite_one() -> N
 @pytest.mark.parametrize("robot", ["3rpr_m1", "3rrr_m1", "3rps", "rrrrr_m1"])
 def test_the_determinant_has_the_size_of_the_singular_values_and_one_sign_around_home(robot: str) -> None:
     _, batch = shipped_batch(robot)
-    X = poses_near(batch, 6, 0.02) if batch.coordinates.constant else np.repeat(batch.home[None], 3, axis=0)
+    X = poses_near(batch, 6, 0.02) if batch.coordinates.has_constant_twists else np.repeat(batch.home[None], 3, axis=0)
     found = batch.evaluate(X)
     assert found.determinant is not None
     assert found.reached.all()
@@ -321,9 +321,12 @@ def test_the_determinant_has_the_size_of_the_singular_values_and_one_sign_around
 def test_the_determinant_changes_its_sign_where_a_singular_value_vanishes() -> None:
     _, batch = shipped_batch("3rpr_m1")
     X = np.tile(batch.home, (400, 1, 1))
-    from hrsynth.geometry.so3 import exponential
+    from hrsynth.geometry.so3 import convert_vectors_to_rotations
 
-    X[:, :3, :3] = exponential(np.linspace(0, np.pi, 400)[:, None] * batch.coordinates.rotations[:, 0]) @ X[:, :3, :3]
+    X[:, :3, :3] = (
+        convert_vectors_to_rotations(np.linspace(0, np.pi, 400)[:, None] * batch.coordinates.rotations[:, 0])
+        @ X[:, :3, :3]
+    )
     found = batch.evaluate(X)
     assert found.determinant is not None
     flips = np.flatnonzero(np.diff(np.sign(found.determinant)))
@@ -337,7 +340,7 @@ def test_parts_of_a_sweep_are_the_whole(monkeypatch: pytest.MonkeyPatch) -> None
     _, batch = shipped_batch("quattro")
     X = poses_near(batch, 40, 0.5)
     whole = batch.evaluate(X, cones=0.01)
-    monkeypatch.setattr("hrsynth.batch.program.CHUNK", 7)
+    monkeypatch.setattr("hrsynth.batch.program.POSE_CHUNK_COUNT", 7)
     check_same(whole, batch.evaluate(X, cones=0.01))
     for i, part in enumerate(batch.sweep((X[:15], X[15:]), cones=0.01)):
         rows = whole.interaction_matrix[15 * i : 15 if i == 0 else 40]

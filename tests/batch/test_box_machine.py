@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from hrsynth.batch import box_machine
 from hrsynth.batch.enclosures import BoxFormula, trace_formula
-from hrsynth.geometry.affine import AffineForms, affine, sines, stack
+from hrsynth.geometry.affine import AffineForms, enclose_sines, make_affine, stack
 from hrsynth.geometry.components import cosine, sine, sqrt
 
 flint = pytest.importorskip("flint")
@@ -47,7 +47,7 @@ def boxes(rng: np.random.Generator, count: int, bend: bool) -> list[AffineForms]
     half = rng.uniform(0, 1, (count, INPUTS)) * rng.choice([0.0, 1e-8, 0.01, 1.0], (count, 1))
     eye = np.eye(INPUTS + bend)[:INPUTS]
     return [
-        affine(
+        make_affine(
             rng.uniform(-4, 4, count),
             half[:, i, None] * eye[i],
             1e-15 * half[:, i],
@@ -96,7 +96,7 @@ def test_small_work_stays_in_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 )
 def test_sines_are_those_of_balls(x: float) -> None:
-    found, balls = sines(np.array([x])), flint.arb(x).sin_cos()
+    found, balls = enclose_sines(np.array([x])), flint.arb(x).sin_cos()
     for value, ball in zip(found, balls, strict=True):
         assert abs(flint.arb(float(value[0])) - ball) < 2.0**-50
 
@@ -104,7 +104,7 @@ def test_sines_are_those_of_balls(x: float) -> None:
 @pytest.mark.parametrize("x", [np.nan, np.inf])
 def test_sines_of_what_is_no_angle_warn_of_nothing(x: float) -> None:
     with np.errstate(all="raise"):
-        found = sines(np.array([x]))
+        found = enclose_sines(np.array([x]))
     assert all(each.shape == (1,) for each in found)
 
 

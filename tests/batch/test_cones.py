@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hrsynth.batch.cones import trace_two
-from hrsynth.batch.error_bounds import largest_errors
+from hrsynth.batch.error_bounds import compute_largest_errors
 from hrsynth.batch.program import Program
 from hrsynth.geometry.vectors import Array
 
@@ -62,7 +62,7 @@ def dual_bound(B: Array, C: Array) -> Array:
 def test_no_ascent_ends_higher_and_one_ends_there(kind: str) -> None:
     rng = np.random.default_rng(KINDS.index(kind))
     B, C = forms(kind, rng)
-    found, lower = largest_errors([entries(B), entries(C)])
+    found, lower = compute_largest_errors([entries(B), entries(C)])
     best = climbed(B, C, rng)
     assert np.array_equal(found, lower)
     assert np.all(best <= found * (1 + 1e-12))
@@ -75,5 +75,5 @@ def test_no_ascent_ends_higher_and_one_ends_there(kind: str) -> None:
 def test_numba_finds_the_same(kind: str) -> None:
     pytest.importorskip("numba")
     forms_ = [entries(each) for each in forms(kind, np.random.default_rng(KINDS.index(kind)))]
-    plain, quick = (largest_errors(forms_, compiled=compiled)[0] for compiled in (False, True))
+    plain, quick = (compute_largest_errors(forms_, compiled=compiled)[0] for compiled in (False, True))
     assert quick == pytest.approx(plain, rel=1e-12)

@@ -8,13 +8,13 @@ import pytest
 from batch.test_batch import SOLVED, poses_near, shipped_batch
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.singularity.batch_spectrum import Quick
-from hrsynth.analysis.singularity.condition_check import spectrum
-from hrsynth.batch.configuration_builder import ConfigurationBuilder, coordinates, rates
-from hrsynth.batch.pose_continuation import reach, sweep
+from hrsynth.analysis.singularity.condition_check import compute_spectrum
+from hrsynth.batch.configuration_builder import ConfigurationBuilder, compute_coordinates, compute_rates
+from hrsynth.batch.pose_continuation import sweep, track_to_pose
 from hrsynth.description import load
 from hrsynth.errors import Disagreement
 from hrsynth.mechanism.pose import Grid
-from hrsynth.tolerances import CLOSED
+from hrsynth.tolerances import CLOSURE_RESIDUAL_TOL
 from kinematics.robots import ROBOTS
 
 WITHOUT = SOLVED | {"i4l", "prrrp_parallel_point"}
@@ -42,7 +42,7 @@ def test_every_pose_that_is_reached_becomes_a_closed_configuration(robot: str) -
     for i, at in enumerate(met):
         if at is None:
             continue
-        assert at.residual <= CLOSED
+        assert at.residual <= CLOSURE_RESIDUAL_TOL
         assert np.max(np.abs(at.pose(batch.coordinates.link) - X[i])) < 1e-9
         u = [at.pose(o.link)[:3, :3] @ o.direction for o in setup.placer.seen.values()]
         assert np.max(np.abs(np.array(u) - found.directions[i])) < 1e-9
@@ -54,7 +54,7 @@ def test_coordinates_are_those_of_the_poses_of_all_links(robot: str) -> None:
     model = setup.all_samples.model
     for member in setup.all_samples.members:
         at = member.configuration
-        q = coordinates(model, {name: at.pose(name)[None] for name in model.mechanism.links})[0]
+        q = compute_coordinates(model, {name: at.pose(name)[None] for name in model.mechanism.links})[0]
         assert np.max(np.abs(model.residual(q))) < 1e-9
         for name in model.mechanism.links:
             assert np.max(np.abs(model.pose(q, name) - at.pose(name))) < 1e-9
@@ -69,7 +69,9 @@ def test_what_velocities_do_is_what_pinocchio_says(robot: str) -> None:
     X = np.array([model.poses(at.q, names) for at in closed])
     assert len(closed) > 3
     for link in names:
-        for at, J, V in zip(closed, *rates(model, {name: X[:, i] for i, name in enumerate(names)}, link), strict=True):
+        for at, J, V in zip(
+            closed, *compute_rates(model, {name: X[:, i] for i, name in enumerate(names)}, link), strict=True
+        ):
             theirs, (_, moves) = model.jacobian(at.q), model.frames(at.q, (link,), whole=0)
             # the rates of a ball are told in one frame or another
             ours, other = (
@@ -85,7 +87,7 @@ def test_walks_give_as_many_different_configurations_as_asked_for(robot: str) ->
     setup, placer = placer_of(robot)
     walk = list(placer.random_walk(60, seed=2))
     assert len(walk) == 60
-    assert all(at.residual <= CLOSED for at in walk)
+    assert all(at.residual <= CLOSURE_RESIDUAL_TOL for at in walk)
     places = [at.pose(setup.mechanism.platform)[:3, 3] for at in walk]
     assert np.std(places, axis=0).max() > 0.02 * placer.batch.length
     again = list(placer.random_walk(60, seed=2))
@@ -118,7 +120,7 @@ def test_singular_values_are_pinocchios_also_where_another_working_mode_is_met()
     setup, placer = placer_of("3rrr_m1")
     all_samples, observation_model = setup.all_samples, setup.samples.observation_model
     walk = [
-        reach(
+        track_to_pose(
             all_samples.start,
             all_samples.observation_model,
             setup.motion.pose(at.pose(setup.mechanism.platform)),
@@ -130,7 +132,9 @@ def test_singular_values_are_pinocchios_also_where_another_working_mode_is_met()
     quick = Quick.of(placer, observation_model)
     assert quick is not None
     for ours, theirs in zip(
-        quick.spectrum([*walk, other], spectrum), spectrum([*walk, other], observation_model), strict=True
+        quick.spectrum([*walk, other], compute_spectrum),
+        compute_spectrum([*walk, other], observation_model),
+        strict=True,
     ):
         assert ours == pytest.approx(theirs, rel=1e-9)
 
@@ -140,7 +144,7 @@ def test_a_batch_that_disagrees_with_pinocchio_is_refused(monkeypatch: pytest.Mo
     quick = Quick.of(placer, setup.samples.observation_model)
     assert quick is not None
     monkeypatch.setattr(
-        "hrsynth.analysis.singularity.batch_spectrum.interaction_matrix", lambda found: 1.01 * found.rates
+        "hrsynth.analysis.singularity.batch_spectrum.compute_interaction_matrix", lambda found: 1.01 * found.rates
     )
     with pytest.raises(Disagreement):
-        quick.spectrum([member.configuration for member in setup.all_samples.members], spectrum)
+        quick.spectrum([member.configuration for member in setup.all_samples.members], compute_spectrum)

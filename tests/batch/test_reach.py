@@ -12,17 +12,17 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.batch.pose_continuation import generic_motion, reach, sweep
+from hrsynth.batch.pose_continuation import find_generic_motion, sweep, track_to_pose
 from hrsynth.description import load
-from hrsynth.errors import BadRequest, NotSampled, PoseNotReached
-from hrsynth.geometry.so3 import logarithm, turn_about
+from hrsynth.errors import BadRequest, PoseReachFailure, SamplingFailure
+from hrsynth.geometry.so3 import convert_rotations_to_vectors, turn_about
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.leg_reach import beyond_rods
+from hrsynth.kinematics.leg_reach import find_beyond_rods
 from hrsynth.kinematics.platform_motion import PlatformMotion
 from hrsynth.kinematics.tasks import solve
 from hrsynth.mechanism.pose import Grid, Pose
-from hrsynth.tolerances import CLOSED
+from hrsynth.tolerances import CLOSURE_RESIDUAL_TOL
 from kinematics.robots import ROBOTS, setting_of, state_of
 from oracle import Oracle, exponential
 from strategies import parallel_robots, planar, random_rotation, transformed
@@ -47,8 +47,8 @@ def had(motion: PlatformMotion, X: Array) -> Pose:
 
 def check_reached(setup: ObservedRobot, motion: PlatformMotion, X: Array) -> ClosedConfiguration:
     all_samples = setup.all_samples
-    at = reach(all_samples.start, all_samples.observation_model, had(motion, X), motion)
-    assert at.residual <= CLOSED
+    at = track_to_pose(all_samples.start, all_samples.observation_model, had(motion, X), motion)
+    assert at.residual <= CLOSURE_RESIDUAL_TOL
     found = at.pose(motion.link)
     assert np.linalg.norm(motion.position(found) - motion.position(X)) < 1e-9
     if motion.body:
@@ -80,10 +80,10 @@ def check_printed(setup: ObservedRobot) -> None:
     motion, all_samples = motion_of(setup), setup.all_samples
     for member in setup.all_samples.members[:3]:
         printed = Pose.parse(str(motion.pose(member.way[0].pose)))
-        at = reach(all_samples.start, all_samples.observation_model, printed, motion)
+        at = track_to_pose(all_samples.start, all_samples.observation_model, printed, motion)
         apart = motion.position(at.pose(motion.link)) - motion.position(member.way[0].pose)
         assert np.linalg.norm(apart) < 1e-5 * max(1.0, float(np.abs(motion.position(motion.home)).max()))
-        assert at.residual <= CLOSED
+        assert at.residual <= CLOSURE_RESIDUAL_TOL
 
 
 @pytest.mark.some(12)
@@ -112,11 +112,13 @@ def test_a_pose_of_a_robot_that_stands_aslant_can_be_typed_as_it_is_printed(robo
 def test_what_a_platform_can_change(robot: str, parts: tuple[str, ...]) -> None:
     setup = setting_of(robot)
     all_samples = setup.all_samples
-    assert motion_of(setup).parts == generic_motion(all_samples.start, all_samples.observation_model).parts == parts
+    assert (
+        motion_of(setup).parts == find_generic_motion(all_samples.start, all_samples.observation_model).parts == parts
+    )
     for name in {"x", "y", "z", "phi", "rpy"} - set(parts):
         pose = Pose(rpy=(0.1, 0, 0)) if name == "rpy" else Pose(**{name: 0.123})
         with pytest.raises(BadRequest, match=f"cannot change {name}") as caught:
-            reach(all_samples.start, all_samples.observation_model, pose)
+            track_to_pose(all_samples.start, all_samples.observation_model, pose)
         assert caught.value.expected == ", ".join(parts)
 
 
@@ -125,13 +127,13 @@ def test_a_part_that_never_changes_may_be_given_as_it_is() -> None:
     for robot, text in (("3rrr_m1", "x=0.01,y=0.02,z=0,rpy=0/0/0.05"), ("delta", "x=0.05,y=0,z=-0.6,rpy=0/0/0")):
         all_samples = setting_of(robot).all_samples
         wanted = Pose.parse(text)
-        at = reach(all_samples.start, all_samples.observation_model, wanted)
+        at = track_to_pose(all_samples.start, all_samples.observation_model, wanted)
         X = at.pose(all_samples.observation_model.platform)
         assert np.allclose(X[:3, 3], [wanted.x, wanted.y, wanted.z], atol=1e-9)
         assert np.allclose(X[:3, :3], wanted.rotation, atol=1e-9)
     all_samples = setting_of("3rrr_m1").all_samples
     with pytest.raises(BadRequest, match="one axis only"):
-        reach(all_samples.start, all_samples.observation_model, Pose.parse("rpy=0.1/0/0"))
+        track_to_pose(all_samples.start, all_samples.observation_model, Pose.parse("rpy=0.1/0/0"))
 
 
 @pytest.mark.parametrize(
@@ -150,14 +152,14 @@ def test_free_parts_are_nearest_to_zero(robot: str, text: str) -> None:
     """No configuration nearby with the same given parts lies nearer to the zero pose."""
     setup = setting_of(robot)
     all_samples, motion, pose = setup.all_samples, motion_of(setup), Pose.parse(text)
-    at = reach(all_samples.start, all_samples.observation_model, pose, motion)
+    at = track_to_pose(all_samples.start, all_samples.observation_model, pose, motion)
     goal, model = motion.goal(pose), at.model
-    assert np.linalg.norm(goal.error_and_jacobian(model, at.q)[0]) < CLOSED
+    assert np.linalg.norm(goal.error_and_jacobian(model, at.q)[0]) < CLOSURE_RESIDUAL_TOL
 
     def distance(q: Array) -> float:
         X = model.pose(q, motion.link)
         shift = (motion.position(X) - motion.position(motion.home)) / model.length
-        turn = logarithm(X[:3, :3] @ motion.home[:3, :3].T) if motion.body else np.zeros(3)
+        turn = convert_rotations_to_vectors(X[:3, :3] @ motion.home[:3, :3].T) if motion.body else np.zeros(3)
         return float(np.linalg.norm([*shift, *turn]))
 
     rng = np.random.default_rng(1)
@@ -165,7 +167,7 @@ def test_free_parts_are_nearest_to_zero(robot: str, text: str) -> None:
     for _ in range(20):
         kernel, _ = at.kernel()
         q, residual = solve(model, model.integrate(at.q, 1e-2 * kernel @ rng.normal(size=kernel.shape[1])), goal)
-        if residual <= CLOSED:
+        if residual <= CLOSURE_RESIDUAL_TOL:
             compared += 1
             assert distance(q) >= least - 1e-9
     assert compared > 10
@@ -173,7 +175,7 @@ def test_free_parts_are_nearest_to_zero(robot: str, text: str) -> None:
 
 def test_the_empty_pose_is_the_zero_configuration() -> None:
     all_samples = setting_of("3rrr_m1").all_samples
-    at = reach(all_samples.start, all_samples.observation_model, Pose())
+    at = track_to_pose(all_samples.start, all_samples.observation_model, Pose())
     np.testing.assert_allclose(at.q, all_samples.start.q, atol=1e-12)
 
 
@@ -186,7 +188,7 @@ def test_phi_of_a_planar_robot_is_about_its_normal(seed: int, angle: float) -> N
     motion = motion_of(setup)
     assert abs(abs(normal @ motion.normal) - 1) < 1e-9
     assert motion.normal[np.argmax(np.abs(motion.normal))] > 0
-    at = reach(setup.all_samples.start, setup.all_samples.observation_model, Pose(phi=angle), motion)
+    at = track_to_pose(setup.all_samples.start, setup.all_samples.observation_model, Pose(phi=angle), motion)
     turn = at.pose("platform")[:3, :3] @ motion.home[:3, :3].T
     np.testing.assert_allclose(turn, exponential(angle * motion.normal), atol=1e-9)
 
@@ -225,10 +227,10 @@ def test_what_rods_keep_away_is_not_reached(robot: str) -> None:
     setup = setting_of(robot)
     motion = motion_of(setup)
     poses = [motion.goal(had(motion, member.configuration.pose(motion.link))) for member in setup.all_samples.members]
-    assert beyond_rods(setup.mechanism, motion, poses) == set()
+    assert find_beyond_rods(setup.mechanism, motion, poses) == set()
     if robot in ("rrrrr_m1", "3rrr_m1", "delta", "quattro"):
         far = motion.goal(replace(had(motion, motion.home), x=9.0))
-        assert beyond_rods(setup.mechanism, motion, [*poses, far]) == {len(poses)}
+        assert find_beyond_rods(setup.mechanism, motion, [*poses, far]) == {len(poses)}
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -247,7 +249,7 @@ def test_beyond_rods_is_beyond_the_circles_of_a_five_bar(seed: int) -> None:
         crank, rod = np.linalg.norm(b - a), np.linalg.norm(end - b)
         far = np.linalg.norm(end + across.T - a, axis=1)
         inside &= (far <= crank + rod) & (far >= abs(crank - rod))
-    assert beyond_rods(setup.mechanism, motion, goals) == set(np.flatnonzero(~inside))
+    assert find_beyond_rods(setup.mechanism, motion, goals) == set(np.flatnonzero(~inside))
     assert 0 < inside.sum() < 200
 
 
@@ -276,8 +278,8 @@ def test_the_leg_that_misses_is_named(x: float, y: float, leg: str) -> None:
     all_samples = setting_of("rrrrr_m1").all_samples
     misses = {label: np.linalg.norm([x, y] - foot) - (CRANK + ROD) for label, foot in zip("12", FEET, strict=True)}
     assert max(misses, key=misses.__getitem__) == leg
-    with pytest.raises(PoseNotReached) as caught:
-        reach(all_samples.start, all_samples.observation_model, Pose(x, y))
+    with pytest.raises(PoseReachFailure) as caught:
+        track_to_pose(all_samples.start, all_samples.observation_model, Pose(x, y))
     error = caught.value
     assert error.leg == leg
     assert error.millimetres == pytest.approx(1e3 * misses[leg], rel=1e-4)
@@ -308,8 +310,8 @@ def test_the_miss_of_a_leg_whose_platform_only_translates(x: float, y: float, z:
         ]
         distances, rod = np.linalg.norm(np.array(circle) - wanted, axis=1), np.linalg.norm(tip - elbow)
         misses[leg.label] = max(distances.min() - rod, rod - distances.max(), 0.0)
-    with pytest.raises(PoseNotReached) as caught:
-        reach(setup.all_samples.start, setup.all_samples.observation_model, Pose(x, y, z))
+    with pytest.raises(PoseReachFailure) as caught:
+        track_to_pose(setup.all_samples.start, setup.all_samples.observation_model, Pose(x, y, z))
     assert caught.value.degrees < 1e-6
     assert caught.value.millimetres == pytest.approx(1e3 * max(misses.values()), rel=1e-4)
     assert misses[caught.value.leg] == pytest.approx(max(misses.values()), rel=1e-4)
@@ -318,8 +320,8 @@ def test_the_miss_of_a_leg_whose_platform_only_translates(x: float, y: float, z:
 def test_a_pose_that_each_leg_alone_can_take() -> None:
     """The planes of the three legs together keep a level platform from turning about z; one plane alone does not."""
     all_samples = setting_of("3rps").all_samples
-    with pytest.raises(PoseNotReached) as caught:
-        reach(all_samples.start, all_samples.observation_model, Pose(z=0.4, phi=0.02))
+    with pytest.raises(PoseReachFailure) as caught:
+        track_to_pose(all_samples.start, all_samples.observation_model, Pose(z=0.4, phi=0.02))
     assert caught.value.leg is None
     assert "each leg alone can close there" in str(caught.value)
     assert 0 <= caught.value.came < 1
@@ -380,8 +382,8 @@ def test_a_straight_way_that_touches_a_fold_does_not_pass_it(length: float, side
     far = np.linalg.norm(home - FEET[0])
     turned = exponential(side * np.arcsin(least / far) * np.array([0.0, 0.0, 1.0]))[:2, :2]
     x, y = home + length * np.sqrt(far**2 - least**2) / far * turned @ (FEET[0] - home)
-    with pytest.raises(PoseNotReached) as refused:
-        reach(all_samples.start, all_samples.observation_model, Pose(float(x), float(y)))
+    with pytest.raises(PoseReachFailure) as refused:
+        track_to_pose(all_samples.start, all_samples.observation_model, Pose(float(x), float(y)))
     assert refused.value.came == pytest.approx(1 / length, abs=1e-2)
 
 
@@ -403,7 +405,7 @@ def test_a_sweep_finds_what_single_poses_find() -> None:
     grid = Grid.parse("x=-0.2:0.2:5,y=-0.2:0.2:4,z=-0.6")
     found = sweep(all_samples.start, all_samples.observation_model, grid)
     for pose, at in zip(grid.poses(), found, strict=True):
-        alone = reach(all_samples.start, all_samples.observation_model, pose)
+        alone = track_to_pose(all_samples.start, all_samples.observation_model, pose)
         assert at is not None
         for link in at.model.mechanism.links:
             if link.startswith("arm"):
@@ -419,7 +421,7 @@ def test_a_grid_out_of_reach_is_empty() -> None:
 def test_on_the_edge_of_the_workspace_a_leg_is_stretched(degrees: float) -> None:
     all_samples = setting_of("rrrrr_m1").all_samples
     x, y = FEET[1] + (CRANK + ROD) * np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])
-    at = reach(all_samples.start, all_samples.observation_model, Pose(float(x), float(y)))
+    at = track_to_pose(all_samples.start, all_samples.observation_model, Pose(float(x), float(y)))
     assert abs(bend(at, "2")) < 1e-9
     assert abs(bend(at, "1")) > 0.1
 
@@ -430,10 +432,10 @@ def test_parts_that_depend_on_each_other_are_said_to() -> None:
     setup = setting_of("3rps")
     all_samples = setup.all_samples
     words = "has 3 dof, and at zero and at a random configuration parts of this pose depend on each other"
-    with pytest.raises(PoseNotReached, match=words) as refused:
-        reach(all_samples.start, all_samples.observation_model, Pose.parse("z=0.32,rpy=0.1/0.05/0"))
+    with pytest.raises(PoseReachFailure, match=words) as refused:
+        track_to_pose(all_samples.start, all_samples.observation_model, Pose.parse("z=0.32,rpy=0.1/0.05/0"))
     assert "blocked" not in str(refused.value)
-    near = reach(all_samples.start, all_samples.observation_model, Pose.parse(refused.value.last))
+    near = track_to_pose(all_samples.start, all_samples.observation_model, Pose.parse(refused.value.last))
     R = near.pose(motion_of(setup).link)[:3, :3] @ motion_of(setup).home[:3, :3].T
     assert abs(R[0, 1] - R[1, 0]) < 1e-6
 
@@ -456,8 +458,8 @@ def test_a_grid_goes_on_where_the_nearest_pose_is_a_dead_end() -> None:
 def test_one_part_does_not_depend_on_itself() -> None:
     """Huang: a 3-RPS does not turn about its normal at all."""
     all_samples = setting_of("3rps").all_samples
-    with pytest.raises(PoseNotReached, match="at a random configuration none of them changes this part") as refused:
-        reach(all_samples.start, all_samples.observation_model, Pose.parse("phi=0.02"))
+    with pytest.raises(PoseReachFailure, match="at a random configuration none of them changes this part") as refused:
+        track_to_pose(all_samples.start, all_samples.observation_model, Pose.parse("phi=0.02"))
     assert "depend on each other" not in str(refused.value)
 
 
@@ -465,8 +467,8 @@ def test_one_part_does_not_depend_on_itself() -> None:
 def test_what_is_too_far_does_not_depend(robot: str, pose: str) -> None:
     """The point of the 3-RPS is never more than its radius aside (Huang), whatever depends to first order at zero."""
     all_samples = setting_of(robot).all_samples
-    with pytest.raises(PoseNotReached, match="each leg alone can close there") as refused:
-        reach(all_samples.start, all_samples.observation_model, Pose.parse(pose))
+    with pytest.raises(PoseReachFailure, match="each leg alone can close there") as refused:
+        track_to_pose(all_samples.start, all_samples.observation_model, Pose.parse(pose))
     assert "depend" not in str(refused.value)
     assert "changes this part" not in str(refused.value)
 
@@ -474,15 +476,17 @@ def test_what_is_too_far_does_not_depend(robot: str, pose: str) -> None:
 def test_a_leg_without_a_way_to_a_pose_is_tried_all_the_same() -> None:
     """Where a leg's Jacobian has no full rank and the damping has gone to nearly nothing."""
     all_samples = setting_of("3rps").all_samples
-    with pytest.raises(PoseNotReached):
-        reach(all_samples.start, all_samples.observation_model, Pose.parse("y=0.5,phi=0.05"))
+    with pytest.raises(PoseReachFailure):
+        track_to_pose(all_samples.start, all_samples.observation_model, Pose.parse("y=0.5,phi=0.05"))
 
 
 def test_a_constraint_singularity_on_the_way_is_told() -> None:
     """The loops of the 3-UPU lose rank 0.36 m aside at this height; what is not reached is not 100 % of the way."""
     all_samples = setting_of("3upu").all_samples
-    with pytest.raises(PoseNotReached, match="the loops lose rank") as refused:
-        reach(all_samples.start, all_samples.observation_model, Pose.parse("x=0.18,y=0.31176914536239791,z=1.2"))
+    with pytest.raises(PoseReachFailure, match="the loops lose rank") as refused:
+        track_to_pose(
+            all_samples.start, all_samples.observation_model, Pose.parse("x=0.18,y=0.31176914536239791,z=1.2")
+        )
     assert "more than 99.9 % of the way" in str(refused.value)
     assert "100 %" not in str(refused.value)
 
@@ -491,14 +495,14 @@ def test_a_pose_is_not_reached_though_no_walk_leads_away(monkeypatch: pytest.Mon
     """Whether parts depend on each other elsewhere is then not known, and not said."""
 
     def none(start: ClosedConfiguration, count: int, *, steps: int) -> Iterator[ClosedConfiguration]:
-        raise NotSampled("", 0, count, 10)
+        raise SamplingFailure("", 0, count, 10)
         yield start
 
     setup = setting_of("3rps")
     all_samples, motion = setup.all_samples, motion_of(setup)
-    monkeypatch.setattr("hrsynth.batch.pose_continuation.random_walk", none)
-    with pytest.raises(PoseNotReached) as refused:
-        reach(all_samples.start, all_samples.observation_model, Pose.parse("phi=0.02"), motion)
+    monkeypatch.setattr("hrsynth.batch.pose_continuation.walk_randomly", none)
+    with pytest.raises(PoseReachFailure) as refused:
+        track_to_pose(all_samples.start, all_samples.observation_model, Pose.parse("phi=0.02"), motion)
     assert "random configuration" not in str(refused.value)
 
 
@@ -525,7 +529,7 @@ def test_a_turn_that_two_others_make_together_is_reached(angles: str, tmp_path: 
         assert at is not None
         assert pose.phi is not None
         assert turn_about(np.array([0.0, 0.0, 1.0]), at.pose("stem")[:3, :3])[0] == pytest.approx(pose.phi, abs=1e-9)
-        alone = reach(all_samples.start, all_samples.observation_model, pose).pose("stem")[:3, :3]
+        alone = track_to_pose(all_samples.start, all_samples.observation_model, pose).pose("stem")[:3, :3]
         least = 2 * np.arctan(np.sqrt(np.tan(abs(pose.phi) / 2)))
         for R in (at.pose("stem")[:3, :3], alone):
             np.testing.assert_allclose(

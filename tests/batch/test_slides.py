@@ -13,7 +13,7 @@ from hrsynth.batch.engine import Batch
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.walking import random_walk
+from hrsynth.kinematics.walking import walk_randomly
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Mechanism
 from strategies import random_rotation
@@ -75,7 +75,7 @@ def test_with_its_slides_a_batch_is_the_closed_robot(robot: str) -> None:
     observed, platform = all_samples.observation_model.observations[: setup.defaults], setup.mechanism.platform
     legs = [each.leg for each in observed]
     assert set(batch.sliding) == {leg for leg, form in batch.legs.items() if form is None} != set()
-    walk = list(random_walk(all_samples.start, 8, seed=3, steps=4))
+    walk = list(walk_randomly(all_samples.start, 8, seed=3, steps=4))
     X, s = np.array([at.pose(platform) for at in walk]), np.array([slid(batch, at) for at in walk])
     assert np.ptp(s) > 0.01 * batch.length
     found = batch.evaluate(X, legs, slides=s)
@@ -111,7 +111,7 @@ def test_what_the_pose_alone_says_is_the_same(robot: str) -> None:
     np.testing.assert_array_equal(both.directions[:2], alone.directions[:2])
     np.testing.assert_array_equal(both.interaction_matrix[:2, :, :-1], alone.interaction_matrix[:2])
     assert not np.any(both.interaction_matrix[:2, :, -1])
-    assert not batch.complete
+    assert not batch.is_complete
     with pytest.raises(BadRequest, match="unknown leg of the batch"):
         batch.evaluate(X, next(iter(batch.sliding)))
     for wrong in (s[:, 0], s[:2], np.hstack([s, s])):

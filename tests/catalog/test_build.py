@@ -22,12 +22,12 @@ from hypothesis import strategies as st
 
 from catalog.stub import REFUSED, broken, died, entry, source, without_checksum
 from hrsynth.catalog import load
-from hrsynth.catalog.build import architectures, build, check
+from hrsynth.catalog.build import build, check, list_architectures
 from hrsynth.catalog.journal import Journal
-from hrsynth.catalog.jsonl import decode_lines, encode_lines, line
+from hrsynth.catalog.jsonl import decode_lines, encode_lines, format_line
 from hrsynth.catalog.store import store
-from hrsynth.description.files import seal_line
-from hrsynth.errors import BadRequest, BuildStopped, HrsynthError
+from hrsynth.description.files import add_checksum
+from hrsynth.errors import BadRequest, BuildInterruption, HrsynthError
 
 TESTS = Path(__file__).resolve().parent.parent
 
@@ -83,7 +83,8 @@ def test_a_group_is_one_file_sorted_compact_and_ascii(whole: dict[str, bytes]):
         crc = zlib.crc32(data.partition(b"\n")[2])
         assert head == f'{{"format":2,"catalog":1,"group":"{group}","count":{len(lines)},"crc32":"{crc:08x}"}}'
         assert lines == [
-            line({**entry_or_refused(word), "key": word, "group": group}) for word in sorted(source().groups[group]())
+            format_line({**entry_or_refused(word), "key": word, "group": group})
+            for word in sorted(source().groups[group]())
         ]
         assert b"null" not in data
 
@@ -161,7 +162,7 @@ def test_a_torn_journal_is_read_up_to_where_it_is_whole(
 ):
     """Cut anywhere, with rubbish at the end or zeros in a line: what is whole is kept, and appended to."""
     path = tmp_path_factory.mktemp("torn") / "x.part"
-    lines = [line({**entry(f"(w{i})"), "key": f"(w{i})", "group": "x"}) for i in range(8)]
+    lines = [format_line({**entry(f"(w{i})"), "key": f"(w{i})", "group": "x"}) for i in range(8)]
     with Journal(path, "x") as journal:
         head = path.stat().st_size
         journal.add((f"(w{i})", text) for i, text in enumerate(lines))
@@ -170,12 +171,12 @@ def test_a_torn_journal_is_read_up_to_where_it_is_whole(
         parts = data.splitlines(keepends=True)
         data = b"".join([*parts[:broken], b"\0" * (len(parts[broken]) - 1) + b"\n", *parts[broken + 1 :]])
     path.write_bytes(data + tail.replace(b"\n", b" "))
-    whole = [text for text in lines if f"{seal_line(text)}\n".encode() in data]
+    whole = [text for text in lines if f"{add_checksum(text)}\n".encode() in data]
     with Journal(path, "x") as journal:
         found = [f"(w{i})" for i, text in enumerate(lines) if text in whole]
         assert [f"(w{i})" in journal for i in range(8)] == [text in whole for text in lines]
         assert list(journal.lines(found)) == whole
-        journal.add([("(new)", new := line({**entry("(new)"), "group": "x"}))])
+        journal.add([("(new)", new := format_line({**entry("(new)"), "group": "x"}))])
     with Journal(path, "x") as journal:
         assert len(journal) == len(whole) + 1
         assert list(journal.lines(["(new)"])) == [new]
@@ -187,7 +188,7 @@ def test_a_record_is_on_the_disk_before_the_next_is_made(tmp_path: Path, monkeyp
     sizes: list[int] = []
     with Journal(tmp_path / "x.part", "x") as journal:
         for word in source().groups["c"]():
-            journal.add([(word, line({"key": word, "group": "x"}))])
+            journal.add([(word, format_line({"key": word, "group": "x"}))])
             sizes.append((tmp_path / "x.part").stat().st_size)
     assert safe[1:] == sizes == sorted(set(sizes))
 
@@ -197,8 +198,8 @@ def test_a_journal_of_something_else_is_refused(tmp_path: Path):
     for text, said in [
         ("a list\nof words\n", "journal without checksums"),
         ('{"format":2,"catalog":1,"group":"c"}\n', "journal without checksums .* Remove the file or use --anew"),
-        (seal_line("keys") + "\n", "not a head"),
-        (seal_line('{"format":2,"catalog":99}') + "\n", "another version"),
+        (add_checksum("keys") + "\n", "not a head"),
+        (add_checksum('{"format":2,"catalog":99}') + "\n", "another version"),
     ]:
         path.write_text(text)
         with pytest.raises(BadRequest, match=said):
@@ -282,7 +283,7 @@ def test_kin_are_made_in_one_process():
 
 def test_a_worker_that_dies_stops_the_build_in_one_line(tmp_path: Path, whole: dict[str, bytes]):
     pytest.importorskip("joblib")
-    with pytest.raises(BuildStopped, match=r"a worker process died; finished work is kept in .*d\.jsonl\.part"):
+    with pytest.raises(BuildInterruption, match=r"a worker process died; finished work is kept in .*d\.jsonl\.part"):
         build(tmp_path, source=replace(source(), entry=died), workers=2)
     assert (tmp_path / "c.jsonl").read_bytes() == whole["c.jsonl"]
     (first, _) = build(tmp_path, source=source())
@@ -296,7 +297,7 @@ def test_a_defect_names_its_word_and_loses_nothing(workers: int, tmp_path: Path)
     if workers > 1:
         pytest.importorskip("joblib")
     with pytest.raises(
-        BuildStopped, match=r"\(c05\): internal error: IndexError: list index.*; finished work is kept in"
+        BuildInterruption, match=r"\(c05\): internal error: IndexError: list index.*; finished work is kept in"
     ):
         build(tmp_path, source=replace(source(), entry=broken), workers=workers)
     assert (tmp_path / "c.jsonl.part").exists()
@@ -317,7 +318,7 @@ def test_a_full_disk_stops_the_build_and_keeps_the_journal(
         return done
 
     monkeypatch.setattr(os, "write", full)
-    with pytest.raises(BuildStopped, match="No space left on device") as stopped:
+    with pytest.raises(BuildInterruption, match="No space left on device") as stopped:
         build(tmp_path, source=source())
     assert stopped.value.exit_status == 3
     assert len(stopped.value.lines()) == 1
@@ -337,7 +338,7 @@ def test_a_disk_full_at_the_end_keeps_the_journal(name: str, tmp_path: Path, mon
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(os, "replace", full)
-    with pytest.raises(BuildStopped, match=r"No space left on device; finished work is kept in .*\.part"):
+    with pytest.raises(BuildInterruption, match=r"No space left on device; finished work is kept in .*\.part"):
         build(tmp_path / name, ["d"], source=source())
     monkeypatch.undo()
     assert not list(tmp_path.rglob("*.tmp"))
@@ -372,7 +373,7 @@ def test_a_large_group_is_packed_and_holds_the_same(
     tmp_path: Path, whole: dict[str, bytes], monkeypatch: pytest.MonkeyPatch
 ):
     """The same lines, whichever of the two files a group had before; a file that is cut off is refused."""
-    monkeypatch.setattr("hrsynth.catalog.store.PACKED_ABOVE", 20)
+    monkeypatch.setattr("hrsynth.catalog.store.UNCOMPRESSED_ENTRIES_MAX", 20)
     build(tmp_path, source=source())
     assert sorted(content(tmp_path)) == ["c.jsonl.gz", "d.jsonl"]
     packed = gzip.decompress((tmp_path / "c.jsonl.gz").read_bytes())
@@ -381,7 +382,7 @@ def test_a_large_group_is_packed_and_holds_the_same(
     assert kept.groups() == ["c", "d"]
     assert kept.lines(["c"], {}) == decode_lines(whole["c.jsonl"], "c")
     assert check(tmp_path, source=source()) == ()
-    monkeypatch.setattr("hrsynth.catalog.store.PACKED_ABOVE", 1000)
+    monkeypatch.setattr("hrsynth.catalog.store.UNCOMPRESSED_ENTRIES_MAX", 1000)
     build(tmp_path, source=source())
     assert content(tmp_path) == whole
     packed = gzip.compress(whole["c.jsonl"], mtime=0)
@@ -396,7 +397,7 @@ def test_a_large_group_is_packed_and_holds_the_same(
 def test_the_catalog_itself_has_the_same_bytes_from_two_workers(words_each: int, tmp_path: Path):
     """A few words of every group: that they are made here or elsewhere, alone or after others, changes nothing."""
     pytest.importorskip("joblib")
-    every = architectures()
+    every = list_architectures()
     few = {group: random.Random(5).sample(every.words(group), words_each) for group in every.groups}
     some = replace(every, groups={group: few[group].copy for group in few})
     build(tmp_path / "one", source=some)
@@ -405,4 +406,4 @@ def test_the_catalog_itself_has_the_same_bytes_from_two_workers(words_each: int,
     assert all(record["group"] in few for record in load(tmp_path / "one"))
     for group, words in few.items():
         (first, *_) = load(tmp_path / "one", group=group)
-        assert line(first) == line({**every.entry(min(words)), "group": group})
+        assert format_line(first) == format_line({**every.entry(min(words)), "group": group})

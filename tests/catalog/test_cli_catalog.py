@@ -16,10 +16,10 @@ from catalog.stub import WORKERS, source
 from hrsynth.catalog import load
 from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.build import build
-from hrsynth.catalog.drawing import drawing
-from hrsynth.cli import execute
+from hrsynth.catalog.drawing import draw_architecture
+from hrsynth.cli import run_command
 from hrsynth.cli.progress import Progress
-from hrsynth.present.text.catalog import SHOWN, entries
+from hrsynth.present.text.catalog import CATALOG_ENTRIES_PRINTED_MAX, format_entries
 from hrsynth.present.text.tables import LINE
 
 
@@ -27,11 +27,11 @@ from hrsynth.present.text.tables import LINE
 def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
     """The command line on the small catalog: status, output, errors."""
     monkeypatch.delenv("HRSYNTH_DEBUG", raising=False)
-    monkeypatch.setattr("hrsynth.catalog.build.architectures", source)
+    monkeypatch.setattr("hrsynth.catalog.build.list_architectures", source)
 
     def call(*arguments: str | Path) -> tuple[int, str, str]:
         capsys.readouterr()
-        return execute(["catalog", *map(str, arguments)]), *capsys.readouterr()
+        return run_command(["catalog", *map(str, arguments)]), *capsys.readouterr()
 
     return call
 
@@ -59,11 +59,11 @@ def test_a_list_reads_only_the_entries_that_it_prints():
             return found
 
     records = Read([{"key": str(i), "refused": "so"} for i in range(1000)])
-    told = entries(records, 2000).splitlines()
-    assert [line.split()[0] for line in told[2:-2]] == [str(i) for i in range(SHOWN)]
+    told = format_entries(records, 2000).splitlines()
+    assert [line.split()[0] for line in told[2:-2]] == [str(i) for i in range(CATALOG_ENTRIES_PRINTED_MAX)]
     assert told[-1].startswith("1000 of 2000 architectures, the first 100 shown")
-    assert records.read == SHOWN
-    assert "shown" not in entries(records[:SHOWN], 2000)
+    assert records.read == CATALOG_ENTRIES_PRINTED_MAX
+    assert "shown" not in format_entries(records[:CATALOG_ENTRIES_PRINTED_MAX], 2000)
 
 
 def test_why_a_word_is_refused_makes_no_column_wide():
@@ -77,7 +77,7 @@ def test_why_a_word_is_refused_makes_no_column_wide():
         "rank": 3,
         "fewest": 3,
     }
-    told = entries([seen, {"key": "b", "notation": "3-PPP", "refused": reason}], 2).splitlines()
+    told = format_entries([seen, {"key": "b", "notation": "3-PPP", "refused": reason}], 2).splitlines()
     assert max(map(len, told)) <= LINE
     assert "refused" in told[3]
     words = [*told[3].split()[3:], *" ".join(told[4:-2]).split()]
@@ -232,7 +232,10 @@ def test_show_studies_what_is_not_in_the_catalog(run, folder: Path):
 )
 def test_drawings_show_motors_and_watched_links(word: str, legs: list[str]):
     """P joints do not turn what is watched: either side of one is the same direction."""
-    drawn = [re.sub(r" ══ Pl\* ── | ── Pl\* ══ ", " ══ Pl* ── ", line) for line in drawing(parse(word)).splitlines()]
+    drawn = [
+        re.sub(r" ══ Pl\* ── | ── Pl\* ══ ", " ══ Pl* ── ", line)
+        for line in draw_architecture(parse(word)).splitlines()
+    ]
     assert sorted(line.split("  ", 1)[1].strip() for line in drawn) == sorted(legs)
     labels = Counter(label for line in drawn for label in re.findall(r"\d+", line.split("base")[0]))
     assert labels == Counter(str(i + 1) for i in range(len(parse(word).legs)))
@@ -307,7 +310,7 @@ def test_the_meter_tells_the_time_left_on_a_terminal(
     ("option", "value", "allowed"), [("--verdict", "contrlable", "uncontrollable"), ("--group", "foo", "planar")]
 )
 def test_what_no_architecture_has_is_refused(option: str, value: str, allowed: str, capsys: pytest.CaptureFixture[str]):
-    assert execute(["catalog", "list", option, value]) == 2
+    assert run_command(["catalog", "list", option, value]) == 2
     said = capsys.readouterr()
     assert said.out == ""
     assert value in said.err

@@ -18,8 +18,8 @@ import pytest
 from catalog.stub import slowly, source
 from catalog.test_build import TESTS, content, lines_in
 from hrsynth.catalog.build import build
-from hrsynth.catalog.executors import executor
-from hrsynth.errors import BadRequest, BuildStopped
+from hrsynth.catalog.executors import open_executor
+from hrsynth.errors import BadRequest, BuildInterruption
 
 pytest.importorskip("distributed")
 SIZES = (24, 12)
@@ -87,7 +87,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(two_workers, tmp_pat
 def test_a_cluster_that_dies_stops_the_build_and_keeps_the_journal(two_workers, tmp_path: Path):
     process, address = two_workers
     killer = meanwhile(tmp_path / "far", lambda: os.killpg(process.pid, signal.SIGKILL))
-    with pytest.raises(BuildStopped, match=r"the cluster does not answer; finished work is kept in") as stopped:
+    with pytest.raises(BuildInterruption, match=r"the cluster does not answer; finished work is kept in") as stopped:
         build(tmp_path / "far", source=replace(source(SIZES), entry=slowly), cluster=address)
     killer.join()
     assert len(stopped.value.lines()) == 1
@@ -116,8 +116,8 @@ def test_a_dead_or_wrong_address_is_one_line(
     monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
 ):
-    monkeypatch.setattr("hrsynth.catalog.executors.PATIENCE", 1.0)
-    with pytest.raises((BuildStopped, BadRequest), match=re.escape(said)) as stopped:
+    monkeypatch.setattr("hrsynth.catalog.executors.CLUSTER_TIMEOUT_S", 1.0)
+    with pytest.raises((BuildInterruption, BadRequest), match=re.escape(said)) as stopped:
         build(tmp_path, source=source(), cluster=address)
     assert stopped.value.exit_status == status
     assert len(stopped.value.lines()) == 1
@@ -127,4 +127,4 @@ def test_a_dead_or_wrong_address_is_one_line(
 def test_workers_or_a_cluster_but_some():
     for arguments in ((0, None), (2, "tcp://127.0.0.1:1")):
         with pytest.raises(BadRequest, match="workers"):
-            executor(*arguments)
+            open_executor(*arguments)

@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 
 from hrsynth.catalog import load
-from hrsynth.catalog.store import ALL, Database, shipped_folder, store
-from hrsynth.cli import execute
+from hrsynth.catalog.store import ALL, Database, locate_shipped_folder, store
+from hrsynth.cli import run_command
 from hrsynth.errors import BadRequest
 
 JOINT = re.compile(r"(2SS|2US|Pi|R|P|C|U|S)[a-z]*([*]?)!?")
@@ -60,13 +60,13 @@ QUESTIONS: dict[str, tuple[str, dict[str, Any], int]] = {
         979,
     ),
 }
-"""Options, what they mean of :func:`plain`, and how many there are."""
+"""Options, what they mean of :func:`convert_to_json`, and how many there are."""
 
 
 @cache
 def plain() -> tuple[dict[str, Any], ...]:
     """All lines but those of sensors, with what a designer asks for, read from words and choices of motors."""
-    folder, found = shipped_folder().path, []
+    folder, found = locate_shipped_folder().path, []
     for file in [*folder.glob("*.jsonl*"), *(folder / "published").glob("*.jsonl*")]:
         text = gzip.decompress(file.read_bytes()) if file.suffix == ".gz" else file.read_bytes()
         found += [_with_motors(json.loads(line)) for line in text.splitlines()[1:] if b'"refused"' not in line]
@@ -91,7 +91,7 @@ def _with_motors(record: dict[str, Any]) -> dict[str, Any]:
 @pytest.mark.parametrize("question", QUESTIONS)
 def test_a_question_is_answered_as_a_plain_count_answers_it(question: str, capsys: pytest.CaptureFixture[str]):
     options, asked, count = QUESTIONS[question]
-    assert execute(["catalog", "list", *shlex.split(options), "--json"]) == 0
+    assert run_command(["catalog", "list", *shlex.split(options), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     wanted = [each["key"] for each in plain() if all(each[name] == value for name, value in asked.items())]
     assert sorted(each["key"] for each in told["entries"]) == sorted(wanted)
@@ -130,7 +130,7 @@ def test_sqlite_files_answer_as_lines_do(tmp_path: Path):
 def test_a_search_that_cannot_be_understood_is_refused(
     option: str, value: str, known: str, capsys: pytest.CaptureFixture[str]
 ):
-    assert execute(["catalog", "list", f"{option}={value}"]) == 2
+    assert run_command(["catalog", "list", f"{option}={value}"]) == 2
     said = capsys.readouterr()
     assert (said.out, len(said.err.splitlines())) == ("", 1)
     assert known in said.err

@@ -12,13 +12,13 @@ import pytest
 from hrsynth.analysis.derive import derive
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.catalog.architecture_key import ArchitectureKey, LegKey, parse
-from hrsynth.catalog.entry import entry, model
-from hrsynth.catalog.geometry import mechanism
+from hrsynth.catalog.entry import build_entry, choose_study_model
+from hrsynth.catalog.geometry import build_mechanism
 from hrsynth.catalog.groups import GROUPS, words
 from hrsynth.catalog.groups.planar import chains
 from hrsynth.description import load
 from hrsynth.errors import BadRequest
-from hrsynth.kinematics.velocity_relation import relation
+from hrsynth.kinematics.velocity_relation import compute_relation
 from oracle import Oracle
 
 SHIPPED = {
@@ -59,7 +59,7 @@ TWO_FIRST = [pytest.param(name, marks=pytest.mark.slow) if name in ("pods", "del
 @pytest.mark.some(1, 6)
 @pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in SHIPPED])
 def test_an_entry_says_what_the_shipped_robot_says(name):
-    found, robot = entry(SHIPPED[name]), derive(load(name))
+    found, robot = build_entry(SHIPPED[name]), derive(load(name))
     assert found["notation"] == robot.architecture.ascii
     hidden = None if robot.hidden_architecture is None else robot.hidden_architecture.ascii
     assert found["hidden"] == hidden
@@ -80,7 +80,9 @@ def _symmetric(platform, motors):
             leg = LegKey(
                 tuple(joint.__class__(joint.letter, joint.axes, i == motor) for i, joint in enumerate(chain.joints))
             )
-            table[letters, motor] = entry(str(ArchitectureKey.of([leg] * (2 if platform else 3), platform=platform)))
+            table[letters, motor] = build_entry(
+                str(ArchitectureKey.of([leg] * (2 if platform else 3), platform=platform))
+            )
     return table
 
 
@@ -163,7 +165,7 @@ def test_what_is_driven_changes_nothing_else():
                 platform=word.platform,
             )
         )
-        one, two = entry(text), entry(other)
+        one, two = build_entry(text), build_entry(other)
         for field in one.keys() - {"key", "notation", "motors", "motor_rank", "driven", "base_motors"}:
             assert one[field] == two[field]
 
@@ -179,14 +181,14 @@ def test_fifty_entries_are_the_same_in_another_process(part: int):
     there = subprocess.run(
         [sys.executable, "-c", code], input="\n".join(reversed(chosen)), text=True, capture_output=True, check=True
     ).stdout.splitlines()
-    assert there == [json.dumps(entry(word), sort_keys=True) for word in reversed(chosen)]
+    assert there == [json.dumps(build_entry(word), sort_keys=True) for word in reversed(chosen)]
 
 
 @pytest.mark.some(1)
 @pytest.mark.parametrize("name", TWO_FIRST)
 def test_verdicts_are_exact_and_confirmed(name):
     for text in random.Random(2).sample(words(name), 3):
-        found = entry(text)
+        found = build_entry(text)
         assert "refused" in found or (found["exact"] and found["confirmed"] >= 5)
         if "refused" not in found:
             assert (
@@ -196,11 +198,11 @@ def test_verdicts_are_exact_and_confirmed(name):
 
 
 def test_what_does_not_move_has_no_verdict():
-    assert entry("3(Pz*-S)+3(Rt*-S)")["refused"].startswith("its loops let no link move")
-    other = entry("3(Ra*-Ra-Ra-Ra-Rb)")["refused"]  # each leg is a four-bar whose coupler is not watched
+    assert build_entry("3(Pz*-S)+3(Rt*-S)")["refused"].startswith("its loops let no link move")
+    other = build_entry("3(Ra*-Ra-Ra-Ra-Rb)")["refused"]  # each leg is a four-bar whose coupler is not watched
     assert other.startswith("neither the platform nor an observed segment moves, but other links do (link_1_1, ")
     with pytest.raises(BadRequest):
-        entry("3(Rz*-Q-Rz)")
+        build_entry("3(Rz*-Q-Rz)")
 
 
 @pytest.mark.slow
@@ -210,10 +212,10 @@ def test_screws_without_pinocchio_see_the_same(name):
     """In maximal coordinates: dof, mobility and rank of all legs and of a smallest set, beside the zero configuration.
     At zero, where a rank is less if the word makes it special (slides normal to z in all legs), Pinocchio's there."""
     for text in random.Random(7).sample(words(name), 3):
-        found = entry(text)
+        found = build_entry(text)
         if "refused" in found:
             continue
-        setup = ObservedRobot.of(mechanism(parse(text)), samples=1)
+        setup = ObservedRobot.of(build_mechanism(parse(text)), samples=1)
         oracle = Oracle(setup.mechanism)
         start, question = setup.all_samples.start, setup.all_samples.observation_model
         sets = [setup.segments, *([o for o in setup.segments if o.leg in each] for each in found["minimal"])]
@@ -225,7 +227,7 @@ def test_screws_without_pinocchio_see_the_same(name):
                 size = 3 if point else 6
                 assert _rank(basis[:size]) == found["dof"]
                 rank = _rank(basis[:size]) - (basis.shape[1] - _rank(basis[size:]))
-                special = relation(start, replace(question, observations=tuple(seen))).rank
+                special = compute_relation(start, replace(question, observations=tuple(seen))).rank
                 assert rank == (special if np.array_equal(state, oracle.zero()) else found["rank"]), text
                 assert special <= found["rank"]
 
@@ -238,4 +240,4 @@ def _rank(rows):
     ("word", "own"), [("3(Rz-Rz*-Rz)", False), ("3(Ra*-Ro-Ro-Ro)", False), ("3(Ra-Ro*-Ro-Ro)", True)]
 )
 def test_motors_count_where_they_keep_joints_apart(word, own):
-    assert str(model(parse(word))) == (word if own else str(parse(word).driven))
+    assert str(choose_study_model(parse(word))) == (word if own else str(parse(word).driven))

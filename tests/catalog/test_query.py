@@ -19,15 +19,15 @@ from hypothesis import strategies as st
 import hrsynth
 from catalog.stub import CHAINS, QUESTIONS, REFUSED, VERDICTS, WORKERS, entry, source, without_checksum
 from hrsynth.catalog import Catalog, load
-from hrsynth.catalog.architecture_key import SENSORS, VERSION
+from hrsynth.catalog.architecture_key import ARCHITECTURE_KEY_VERSION, SENSORS
 from hrsynth.catalog.build import build, check
-from hrsynth.catalog.conditions import FIELDS, places
-from hrsynth.catalog.jsonl import COUNTS, FLAGS, LISTS, Record, line, record, word_of
+from hrsynth.catalog.conditions import FIELDS, list_matching_lines
+from hrsynth.catalog.jsonl import COUNTS, FLAGS, LISTS, Record, format_line, parse_record, parse_word
 from hrsynth.catalog.jsonl import TEXTS as TEXT_FIELDS
 from hrsynth.catalog.known import is_called
-from hrsynth.catalog.query import values
-from hrsynth.catalog.store import Database, Folder, shipped_folder, write_tables
-from hrsynth.cli import execute
+from hrsynth.catalog.query import list_field_values
+from hrsynth.catalog.store import Database, Folder, locate_shipped_folder, write_tables
+from hrsynth.cli import run_command
 from hrsynth.errors import BadRequest
 
 ASKED = st.fixed_dictionaries(
@@ -125,15 +125,15 @@ ANY_FIELD = st.fixed_dictionaries(
 def test_lines_are_left_unread_only_where_they_do_not_fit(asked: dict[str, Any]):
     """Whatever is asked for, and however the file was written."""
     lines, spaced, records = zip(*_every_line(), strict=True)
-    found = list(places(lines, asked, record))
-    assert found == list(places(spaced, asked, record))
+    found = list(list_matching_lines(lines, asked, parse_record))
+    assert found == list(list_matching_lines(spaced, asked, parse_record))
     if isinstance(text := asked.get("text"), str):
         held = [
             i
             for i, each in enumerate(records)
             if is_called(each, text) or any(text.casefold() in str(value).casefold() for value in each.values())
         ]
-        others = places(lines, asked | {"text": None}, record)
+        others = list_matching_lines(lines, asked | {"text": None}, parse_record)
         assert found == [i for i in others if i in set(held)]
 
 
@@ -146,9 +146,9 @@ def test_a_text_is_found_in_lines_as_in_records(text: str):
 @cache
 def _every_line() -> list[tuple[str, str, Record]]:
     """Some lines, how another program may write them, and their records."""
-    kept = shipped_folder()
+    kept = locate_shipped_folder()
     lines = [line for group in kept.groups() for line in kept.lines([group], {})][::97]
-    return [(line, json.dumps(record(line)), record(line)) for line in lines]
+    return [(line, json.dumps(parse_record(line)), parse_record(line)) for line in lines]
 
 
 def test_sqlite_holds_the_same_records(stores: tuple[Path, Path]):
@@ -178,7 +178,7 @@ def test_sqlite_files_of_older_versions_are_refused(has: str, tmp_path: Path, ca
         older.commit()
     for arguments in (["list"], ["list", "--dof", "3"], ["show", "Delta"], ["build", "planar", "--check"]):
         where = "-o" if "build" in arguments else "--catalog"
-        assert execute(["catalog", *arguments, where, str(file)]) == (3 if "build" in arguments else 2)
+        assert run_command(["catalog", *arguments, where, str(file)]) == (3 if "build" in arguments else 2)
         (said,) = capsys.readouterr().err.splitlines()
         assert "another version: got 'format 1, keys 1', expected format 3, keys 1" in said
 
@@ -186,8 +186,8 @@ def test_sqlite_files_of_older_versions_are_refused(has: str, tmp_path: Path, ca
 @pytest.mark.parametrize("name", FIELDS)
 def test_values_of_a_field_are_those_of_all_records(name: str, stores: tuple[Path, Path]):
     lines, big = stores
-    assert values(name, big) == values(name, lines) == load(lines).values(name)
-    assert values(name, big) or name == "sensors"
+    assert list_field_values(name, big) == list_field_values(name, lines) == load(lines).values(name)
+    assert list_field_values(name, big) or name == "sensors"
 
 
 @pytest.mark.parametrize(
@@ -212,7 +212,7 @@ def test_a_file_whose_tables_are_spoilt_is_told(change: str, stores: tuple[Path,
         opened.commit()
     said = set()
     for asked in ([], ["--dof", "3"], ["--text", "lines"], ["--legs", "?-R*"]):
-        status = execute(["catalog", "list", *asked, "--catalog", str(file)])
+        status = run_command(["catalog", "list", *asked, "--catalog", str(file)])
         errors = capsys.readouterr().err
         assert len(errors.splitlines()) == (status == 2)
         assert "spoilt.sqlite: not a " in errors or status == 0
@@ -275,7 +275,7 @@ def test_what_no_record_can_have_is_refused(asked: dict[str, Any], stores: tuple
 
 @pytest.mark.parametrize("line", ['{"key":"abc', '{"key":3}', "[]"])
 def test_lines_that_are_cut_are_told(line: str, tmp_path: Path):
-    text = f'{{"format":2,"catalog":{VERSION},"group":"g","count":1}}\n{line}\n'
+    text = f'{{"format":2,"catalog":{ARCHITECTURE_KEY_VERSION},"group":"g","count":1}}\n{line}\n'
     (tmp_path / "g.jsonl").write_text(text)
     with pytest.raises(BadRequest, match="not a catalog entry"):
         len(load(tmp_path).where(dof=3))
@@ -304,10 +304,10 @@ def test_a_record_with_a_field_of_another_kind_or_without_it_is_one_line(field: 
         odd = {name: each for name, each in whole.items() if (name, value) != (field, "gone")}
         odd |= {} if value == "gone" else {field: value}
         (tmp_path / "planar.jsonl").write_text(
-            f'{{"format":2,"catalog":{VERSION},"group":"planar","count":1}}\n{json.dumps(odd)}\n'
+            f'{{"format":2,"catalog":{ARCHITECTURE_KEY_VERSION},"group":"planar","count":1}}\n{json.dumps(odd)}\n'
         )
         for arguments in commands(tmp_path, word):
-            status = execute(arguments)
+            status = run_command(arguments)
             said = capsys.readouterr()
             assert status == (2 if said.err else 0), (field, value, said)
             assert len(said.err.splitlines()) <= 1, (field, value, said)
@@ -330,7 +330,7 @@ ODD_FILES = {
 @pytest.mark.some(5)
 @pytest.mark.parametrize("name", ["empty", "a folder", "cut", "no gzip", *ODD_FILES])
 def test_an_odd_file_is_one_line(name: str, tmp_path: Path, capsys):
-    head = f'{{"format":2,"catalog":{VERSION},"group":"g","count":1}}\n'.encode()
+    head = f'{{"format":2,"catalog":{ARCHITECTURE_KEY_VERSION},"group":"g","count":1}}\n'.encode()
     file = tmp_path / "g.jsonl"
     match name:
         case "empty":
@@ -338,7 +338,7 @@ def test_an_odd_file_is_one_line(name: str, tmp_path: Path, capsys):
         case "a folder":
             file.mkdir()
         case "cut" | "no gzip":
-            data = gzip.compress(head + line({**entry("(c00)"), "group": "g"}).encode() + b"\n")
+            data = gzip.compress(head + format_line({**entry("(c00)"), "group": "g"}).encode() + b"\n")
             (tmp_path / "g.jsonl.gz").write_bytes(data[: len(data) - 9] if name == "cut" else head)
         case "deep head":
             file.write_bytes(100_000 * b"[" + b"\n")
@@ -349,7 +349,7 @@ def test_an_odd_file_is_one_line(name: str, tmp_path: Path, capsys):
         ["catalog", "build", "planar", "--check", "-o", str(tmp_path)],
         ["catalog", "site", "--catalog", str(tmp_path), "-o", str(tmp_path / "site")],
     ):
-        status = execute(arguments)
+        status = run_command(arguments)
         said = capsys.readouterr()
         if "show" not in arguments or status:  # it may be of another group
             assert (status, len(said.err.splitlines())) == (3 if "--check" in arguments else 2, 1), (arguments, said)
@@ -359,12 +359,14 @@ def test_an_odd_file_is_one_line(name: str, tmp_path: Path, capsys):
 
 def test_a_line_with_other_spaces_or_letters_is_read(tmp_path: Path):
     one, other = (
-        line({**entry("(c00)"), "key": word, "group": "g", "dof": 3, "verdict": verdict, "suggestion": cure})
+        format_line({**entry("(c00)"), "key": word, "group": "g", "dof": 3, "verdict": verdict, "suggestion": cure})
         for word, verdict, cure in (("a", "controllable", None), ("b", "no", "Straße"))
     )
     assert "Stra\\u00dfe" in other
     one = one.replace('"dof":', ' "dof": ').replace("controllable", "controll\\u0061ble")
-    (tmp_path / "g.jsonl").write_text(f'{{"format":2,"catalog":{VERSION},"group":"g","count":2}}\n{one}\n{other}\n')
+    (tmp_path / "g.jsonl").write_text(
+        f'{{"format":2,"catalog":{ARCHITECTURE_KEY_VERSION},"group":"g","count":2}}\n{one}\n{other}\n'
+    )
     assert len(load(tmp_path, dof=3)) == 2
     assert [each["key"] for each in load(tmp_path, verdict="controllable")] == ["a"]
     assert [each["key"] for each in load(tmp_path, text="strasse")] == ["b"]
@@ -374,13 +376,13 @@ def test_a_line_with_other_spaces_or_letters_is_read(tmp_path: Path):
 def test_sqlite_answers_as_the_lines_do(every: int, tmp_path: Path):
     """What may be asked about the shipped catalog, or every seventh record of it; how long it takes stands in
     ``benchmarks/others.py``."""
-    kept, folder, file = shipped_folder(), Folder(tmp_path / "lines"), tmp_path / "all.sqlite"
+    kept, folder, file = locate_shipped_folder(), Folder(tmp_path / "lines"), tmp_path / "all.sqlite"
     folder.path.mkdir()
     groups = {group: kept.lines([group], {})[::every] for group in kept.groups()}
     write_tables(file, groups)
     for group, some in groups.items():
         folder.write(group, some)
-    lines = {word_of(line): line for some in groups.values() for line in some}
+    lines = {parse_word(line): line for some in groups.values() for line in some}
     names = [group for group in kept.groups() if group != SENSORS]
     for asked in (*QUESTIONS, {"text": "lift 1"}):
         found = Database(file).lines(names if asked.get("sensor") is None else [SENSORS], asked)

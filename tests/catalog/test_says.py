@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 import hrsynth
 from hrsynth.catalog.architecture_key import ArchitectureKey, JointSymbol, LegKey, parse
-from hrsynth.catalog.geometry import mechanism
-from hrsynth.catalog.groups.spatial import translates, translational
+from hrsynth.catalog.geometry import build_mechanism
+from hrsynth.catalog.groups.spatial import is_translational_leg, list_translational_legs
 from tables import architectures as says
 
 
@@ -66,7 +66,7 @@ def test_the_theorem_on_planar_robots_is_that_of_their_twists(legs: list[LegKey]
     assert np.linalg.matrix_rank(np.vstack(seen), tol=1e-7) == says.planar_rank(ArchitectureKey("", (tuple(legs),)))
 
 
-TRANSLATING = [chain for chain in translational() if translates(chain)]
+TRANSLATING = [chain for chain in list_translational_legs() if is_translational_leg(chain)]
 
 
 @st.composite
@@ -104,7 +104,7 @@ def test_the_theorem_on_translations_is_that_of_their_twists(legs: list[LegKey],
 def test_legs_translate_that_leave_all_translations_and_nothing_idle() -> None:
     """The letters say what the rank of the leg's twists says."""
     rng = np.random.default_rng(2)
-    for chain in translational():
+    for chain in list_translational_legs():
         turning = {name: rng.normal(size=3) for name in "ab"}
         T = np.array(
             [
@@ -115,13 +115,13 @@ def test_legs_translate_that_leave_all_translations_and_nothing_idle() -> None:
             ]
         ).T
         rank, turns = (np.linalg.matrix_rank(each, tol=1e-9) for each in (T, T[3:]))
-        assert translates(chain) == (rank == len(chain.joints) and rank - turns == 3)
+        assert is_translational_leg(chain) == (rank == len(chain.joints) and rank - turns == 3)
 
 
 @pytest.mark.some(1)
 @pytest.mark.parametrize("word", ["3(Rz*-Rz-Rz)", "3(Rz*!-Rz-Rz)", "3(Px*-Rz-Rz)", "3(Px*!-Rz-Rz)", "3(Px*-Rz!-Ph)"])
 def test_the_rule_is_what_derive_finds(word: str) -> None:
-    robot = mechanism(parse(word))
+    robot = build_mechanism(parse(word))
     assert hrsynth.derive(robot).verdict.rank == says.planar_rank(parse(word))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from hrsynth.catalog import load
 from hrsynth.catalog.architecture_key import LegKey, parse
 from hrsynth.catalog.groups import words
-from hrsynth.catalog.groups.schoenflies import sequences
+from hrsynth.catalog.groups.schoenflies import list_sequences
 from hrsynth.geometry.vectors import Array
 from oracle import exponential
 
@@ -86,7 +86,7 @@ def joints_of(letters: str) -> list[list[str]]:
 
 def test_the_group_has_each_leg_that_twists_allow() -> None:
     """Each observed link: all but those that a P parts from the one before it. Each U but one on the base."""
-    assert set(sequences()) == legs_by_twists()
+    assert set(list_sequences()) == legs_by_twists()
     cuts = [cut for letters in legs_by_twists() for cut in joints_of(letters) if len(cut[0]) == 1]
     listed = [parse(word).legs[0] for word in words("schoenflies")]
     assert {"-".join(cut) for cut in cuts} == {"-".join(letters_of(leg)) for leg in listed}

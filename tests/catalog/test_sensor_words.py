@@ -10,19 +10,19 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from hrsynth.catalog import load
-from hrsynth.catalog.architecture_key import ArchitectureKey, parse, sights
-from hrsynth.catalog.entry import entry
-from hrsynth.catalog.geometry import mechanism
+from hrsynth.catalog.architecture_key import ArchitectureKey, parse, parse_observations
+from hrsynth.catalog.entry import build_entry
+from hrsynth.catalog.geometry import build_mechanism
 from hrsynth.catalog.groups import group, words
-from hrsynth.catalog.jsonl import line
-from hrsynth.cli import execute
-from hrsynth.cli.schema import schema
+from hrsynth.catalog.jsonl import format_line
+from hrsynth.cli import run_command
+from hrsynth.cli.schema import build_schema
 from hrsynth.errors import BadRequest
-from hrsynth.geometry.so3 import exponential
-from hrsynth.geometry.vectors import pose
+from hrsynth.geometry.so3 import convert_vectors_to_rotations
+from hrsynth.geometry.vectors import build_pose
 from hrsynth.mechanism import Observation
 from hrsynth.mechanism.cameras import CameraObservation
-from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.normal import reduce_to_normal_form
 from oracle import Oracle
 
 LISTED = words("sensors")
@@ -57,7 +57,7 @@ def test_what_is_no_sight_is_refused(text: str, told: str):
 def test_sensors_do_not_change_the_mechanism():
     for text in random.Random(5).sample(LISTED, 6):
         word = parse(text)
-        seen, plain = mechanism(word), mechanism(word.unseen)
+        seen, plain = build_mechanism(word), build_mechanism(word.unseen)
         assert [each for each in seen.differences(plain) if "observ" not in each and "camera" not in each] == []
         assert seen.joints.keys() == plain.joints.keys()
         assert [o.kind for o in seen.observations] == [each.kind for each in word.seen]
@@ -78,14 +78,17 @@ def test_screws_without_pinocchio_see_the_same(text: str):
     """At the zero configuration: twists of the platform in maximal coordinates, values a small step along each;
     the rank of the shipped record, of all that is seen and of the smallest sets."""
     found = load(group="sensors")[text]
-    built = normal_form(mechanism(parse(text), found.get("attempt", 0))).mechanism
+    built = reduce_to_normal_form(build_mechanism(parse(text), found.get("attempt", 0))).mechanism
     oracle = Oracle(built)
     twists = oracle.relation(oracle.zero(), [], unit_length=1.0)
     X, base = built.links["platform"].pose, built.links["base"].pose
     step = 1e-6
 
     def slope(seen: Observation, t: np.ndarray) -> np.ndarray:
-        ends = [pose(X[:3, 3] + sign * step * t[:3], exponential(sign * step * t[3:]) @ X[:3, :3]) for sign in (1, -1)]
+        ends = [
+            build_pose(X[:3, 3] + sign * step * t[:3], convert_vectors_to_rotations(sign * step * t[3:]) @ X[:3, :3])
+            for sign in (1, -1)
+        ]
         pairs = [(end, base) if (seen.seen_from or "base") == "platform" else (base, end) for end in ends]
         one, other = (seen.value(*each) for each in pairs)
         return (one - other) / (2 * step)
@@ -118,18 +121,18 @@ def test_known_answers():
 
 def test_a_record_is_fresh():
     text = "3(Rz*-Rz-Rz)@2point"
-    assert line(entry(text)) == line(load(group="sensors")[text])
+    assert format_line(build_entry(text)) == format_line(load(group="sensors")[text])
 
 
 def test_the_command_line_lists_and_shows_them(capsys: pytest.CaptureFixture[str]):
     def call(*words: str) -> tuple[int, str]:
         capsys.readouterr()
-        return execute(["catalog", *words]), capsys.readouterr().out
+        return run_command(["catalog", *words]), capsys.readouterr().out
 
     listed = json.loads(call("list", "--sensor", "3point", "--verdict", "controllable", "--json")[1])
     assert listed["total"] == len(LISTED)
     assert all(each["sensors"] == "3point" for each in listed["entries"])
-    Draft202012Validator(schema("catalog list")).validate(listed)
+    Draft202012Validator(build_schema("catalog list")).validate(listed)
     shown = call("show", "6(Utn-Pl*-S)@3point")[1]
     assert "sensors: 3point" in shown
     assert "danger cylinder" in shown
@@ -138,4 +141,6 @@ def test_the_command_line_lists_and_shows_them(capsys: pytest.CaptureFixture[str
 
 def test_a_word_is_one_value():
     word = parse("3(Rz*-Rz-Rz)")
-    assert ArchitectureKey.of(*map(list, word.bodies), seen=sights("2point")) == parse("3(Rz*-Rz-Rz)@2point")
+    assert ArchitectureKey.of(*map(list, word.bodies), seen=parse_observations("2point")) == parse(
+        "3(Rz*-Rz-Rz)@2point"
+    )

@@ -18,15 +18,15 @@ import hrsynth
 from catalog.stub import WORKERS
 from hrsynth.catalog import Catalog
 from hrsynth.catalog.architecture_key import parse
-from hrsynth.catalog.entry import entry
-from hrsynth.catalog.geometry import mechanism
-from hrsynth.catalog.jsonl import line, record
-from hrsynth.catalog.site import Site, build, folder, site
-from hrsynth.catalog.site.index import LISTS, NUMBERS, TEXTS, columns, notation
-from hrsynth.catalog.site.pages import Study, page, study, write_pages
-from hrsynth.catalog.site.structures import Structure, address_name, structures
-from hrsynth.cli import execute
-from hrsynth.errors import BadRequest, BuildStopped
+from hrsynth.catalog.entry import build_entry
+from hrsynth.catalog.geometry import build_mechanism
+from hrsynth.catalog.jsonl import format_line, parse_record
+from hrsynth.catalog.site import Site, build, folder, write_site
+from hrsynth.catalog.site.index import LISTS, NUMBERS, TEXTS, build_columns, format_notation
+from hrsynth.catalog.site.pages import Study, derive_study, render_page, write_pages
+from hrsynth.catalog.site.structures import Structure, group_structures, hash_name
+from hrsynth.cli import run_command
+from hrsynth.errors import BadRequest, BuildInterruption
 
 REFUSED = "3(Ra*!-Rb-Ra-Ph)"
 WORDS = (
@@ -45,7 +45,7 @@ VOID = {"meta", "link", "br", "input"}
 
 @pytest.fixture(scope="module")
 def catalog() -> Catalog:
-    return Catalog(tuple(record(line({"group": "none", **entry(word)})) for word in WORDS))
+    return Catalog(tuple(parse_record(format_line({"group": "none", **build_entry(word)})) for word in WORDS))
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +62,7 @@ def few() -> Catalog:
 @pytest.fixture(scope="module")
 def made(catalog: Catalog, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Site]:
     target = tmp_path_factory.mktemp("site") / "new"
-    return target, site(catalog, target)
+    return target, write_site(catalog, target)
 
 
 class Page(HTMLParser):
@@ -102,13 +102,13 @@ def everything(target: Path) -> dict[str, bytes]:
 def test_every_record_has_its_page_and_its_robot_file(made, catalog):
     target, done = made
     assert (done.architectures, done.differ) == (len(WORDS), ())
-    assert done.pages == len(list((target / "p").iterdir())) == len(structures(catalog))
-    for each in structures(catalog):
+    assert done.pages == len(list((target / "p").iterdir())) == len(group_structures(catalog))
+    for each in group_structures(catalog):
         page = (target / "p" / f"{each.name}.html").read_text(encoding="utf-8")
         for word in (known["key"] for known in each.records):
-            assert f'data-name="{address_name(word)}"' in page
+            assert f'data-name="{hash_name(word)}"' in page
             assert word in page
-            assert (target / "r" / f"{address_name(word)}.urdf").is_file() == (word != REFUSED)
+            assert (target / "r" / f"{hash_name(word)}.urdf").is_file() == (word != REFUSED)
     assert len(list((target / "r").iterdir())) == len(WORDS) - 1
 
 
@@ -128,7 +128,7 @@ def test_links_lead_somewhere_and_never_to_the_network(made):
 
 def test_drawings_are_well_formed_and_show_the_motors_and_the_virtual_actuators(made, catalog):
     target, _ = made
-    for each in structures(catalog):
+    for each in group_structures(catalog):
         text = (target / "p" / f"{each.name}.html").read_text(encoding="utf-8")
         drawn = [etree.fromstring(svg) for svg in re.findall(r"<svg.*?</svg>", text, flags=re.DOTALL)]
         drawn = [svg for svg in drawn if svg.get("role") == "img"]
@@ -142,7 +142,7 @@ def test_drawings_are_well_formed_and_show_the_motors_and_the_virtual_actuators(
 
 def test_a_page_says_what_the_record_says(made, catalog):
     target, _ = made
-    for each in structures(catalog):
+    for each in group_structures(catalog):
         text = unescape((target / "p" / f"{each.name}.html").read_text(encoding="utf-8"))
         if "refused" in each.fact:
             assert f"Refused: {each.fact['refused']}" in text
@@ -163,8 +163,8 @@ def test_a_page_says_what_the_record_says(made, catalog):
 @pytest.mark.parametrize("word", [word for word in WORDS if word != REFUSED])
 def test_the_robot_file_is_what_save_writes_and_derives_as_the_record(made, catalog, word, tmp_path):
     target, _ = made
-    file = target / "r" / f"{address_name(word)}.urdf"
-    hrsynth.save(mechanism(parse(word)), tmp_path / "robot.urdf")
+    file = target / "r" / f"{hash_name(word)}.urdf"
+    hrsynth.save(build_mechanism(parse(word)), tmp_path / "robot.urdf")
     assert file.read_bytes() == (tmp_path / "robot.urdf").read_bytes()
     derivation = hrsynth.derive(hrsynth.load(file))
     known = catalog[word]
@@ -177,14 +177,14 @@ def test_the_robot_file_is_what_save_writes_and_derives_as_the_record(made, cata
 
 
 def test_columns_hold_what_the_records_hold(catalog):
-    every = structures(catalog)
-    held = columns(every)
+    every = group_structures(catalog)
+    held = build_columns(every)
     records = [each for structure in every for each in structure.records]
     assert sorted(held["key"]) == sorted(WORDS)
     for i, each in enumerate(records):
         assert held["key"][i] == each["key"]
         assert each in every[held["page"][i]].records
-        assert held["name"][i] == address_name(each["key"])
+        assert held["name"][i] == hash_name(each["key"])
         for field in NUMBERS:
             assert held[field][i] == each.get(field)
         for field in TEXTS + LISTS:
@@ -201,7 +201,7 @@ def unmarked(word: str) -> set[str]:
 
 
 def test_structures_part_the_records_and_kin_differ_by_what_is_watched(catalog):
-    every = structures(catalog)
+    every = group_structures(catalog)
     assert sorted(each["key"] for each in chain.from_iterable(s.records for s in every)) == sorted(WORDS)
     words = {each.word: each for each in every}
     assert len(words) == len(every)
@@ -219,39 +219,39 @@ def test_motors_that_change_what_is_known_part_a_structure():
     facts = [
         {"key": word, "group": "none", "rank": rank} for word, rank in (("3(Ra*-Ro-Ro-Ro)", 0), ("3(Ra-Ro*-Ro-Ro)", 3))
     ]
-    assert [(each.word, each.fact["rank"]) for each in structures(facts)] == [
+    assert [(each.word, each.fact["rank"]) for each in group_structures(facts)] == [
         ("3(Ra-Ro*-Ro-Ro)", 3),
         ("3(Ra-Ro-Ro-Ro)", 0),
     ]
-    assert len(structures([{**fact, "rank": 0} for fact in facts])) == 1
+    assert len(group_structures([{**fact, "rank": 0} for fact in facts])) == 1
 
 
 def test_names_are_stable_and_distinct():
-    assert address_name("3(Rz*-Rz-Rz)") == "338940699ed1"
-    assert len({address_name(word) for word in WORDS}) == len(WORDS)
+    assert hash_name("3(Rz*-Rz-Rz)") == "338940699ed1"
+    assert len({hash_name(word) for word in WORDS}) == len(WORDS)
 
 
 def test_what_stands_in_a_page_is_made_safe():
     fact = {"key": "3(S-S)", "group": "none", "refused": "<b>1 < 2 & 'so'"}
-    shown = page(Structure("3(S-S)<u>", (fact,)), Study(0, differs="<i>"), {}, None)
+    shown = render_page(Structure("3(S-S)<u>", (fact,)), Study(0, differs="<i>"), {}, None)
     assert not [tag for tag in ("<b>", "<i>", "<u>") if tag in shown]
     assert Page(shown).links[:2] == ["data:,", "../report.css"]
-    assert notation("2-Pi-{2-U*U}") == "2-Π-{2-<u>U</u>U}"
+    assert format_notation("2-Pi-{2-U*U}") == "2-Π-{2-<u>U</u>U}"
 
 
 def test_a_derivation_that_does_not_end_in_the_record_is_told(catalog):
     fact = {**catalog.records[0], "hidden": "3-R*R", "rank": 2}
-    found = study(fact)
+    found = derive_study(fact)
     assert found.derivation is not None
     assert found.differs == "3-PiR*R, controllable, rank 3"
-    assert not study(catalog.records[0]).differs
+    assert not derive_study(catalog.records[0]).differs
 
 
 def refused(target: Path, catalog: Catalog) -> str:
     """What is said of a folder in which no site can be written; nothing in it changes, nothing comes beside it."""
     before = everything(target.parent)
     with pytest.raises(BadRequest) as caught:
-        site(catalog, target)
+        write_site(catalog, target)
     assert everything(target.parent) == before
     assert "\n" not in str(caught.value)
     return str(caught.value)
@@ -272,10 +272,10 @@ def test_other_folders_are_left_alone(few, tmp_path):
 def test_a_site_replaces_an_older_one_and_nothing_else(few, tmp_path):
     target = tmp_path / "site"
     target.mkdir()
-    site(few, target)
+    write_site(few, target)
     older = everything(target)
     one = Catalog(few.records[3:])
-    assert site(one, target).pages == 1
+    assert write_site(one, target).pages == 1
     assert everything(target).keys() < older.keys()
     assert [file.name for file in tmp_path.iterdir()] == ["site"]
     (target / "notes.txt").write_text("mine")
@@ -283,7 +283,7 @@ def test_a_site_replaces_an_older_one_and_nothing_else(few, tmp_path):
 
 
 def test_a_build_that_was_broken_off_goes_on_and_gives_the_same_bytes(few, tmp_path, monkeypatch):
-    done = site(few, tmp_path / "whole")
+    done = write_site(few, tmp_path / "whole")
     assert (done.now, done.pages) == (3, 3)
     write, count = write_pages, []
 
@@ -295,9 +295,9 @@ def test_a_build_that_was_broken_off_goes_on_and_gives_the_same_bytes(few, tmp_p
 
     monkeypatch.setattr(build, "write_pages", breaks)
     with pytest.raises(KeyboardInterrupt):
-        site(few, tmp_path / "site")
+        write_site(few, tmp_path / "site")
     assert not (tmp_path / "site").exists()
-    again = site(few, tmp_path / "site")
+    again = write_site(few, tmp_path / "site")
     assert (again.now, again.pages) == (2, 3)
     assert everything(tmp_path / "site") == everything(tmp_path / "whole")
     assert sorted(file.name for file in tmp_path.iterdir()) == ["site", "whole"]
@@ -305,7 +305,7 @@ def test_a_build_that_was_broken_off_goes_on_and_gives_the_same_bytes(few, tmp_p
 
 def test_a_full_disk_stops_the_build_and_keeps_the_older_site(few, tmp_path, monkeypatch):
     target = tmp_path / "site"
-    site(Catalog(few.records[3:]), target)
+    write_site(Catalog(few.records[3:]), target)
     before = everything(target)
     full = OSError(errno.ENOSPC, "No space left on device", "page.html")
     for place in (
@@ -315,18 +315,18 @@ def test_a_full_disk_stops_the_build_and_keeps_the_older_site(few, tmp_path, mon
     ):
         with monkeypatch.context() as patched:
             patched.setattr(place, lambda *_: (_ for _ in ()).throw(full))
-            with pytest.raises(BuildStopped, match="No space left") as caught:
-                site(few, target)
+            with pytest.raises(BuildInterruption, match="No space left") as caught:
+                write_site(few, target)
         assert caught.value.exit_status == 3
         assert "\n" not in str(caught.value)
         assert everything(target) == before
-    site(few, target)
+    write_site(few, target)
     assert len(list((target / "p").iterdir())) == 3
 
 
 def test_one_build_at_a_time(few, tmp_path):
-    with folder.draft(tmp_path / "site", {"site": "other"}), pytest.raises(BadRequest, match="another build"):
-        site(few, tmp_path / "site")
+    with folder.open_draft(tmp_path / "site", {"site": "other"}), pytest.raises(BadRequest, match="another build"):
+        write_site(few, tmp_path / "site")
     assert (tmp_path / "site" / "site.json").is_file()
 
 
@@ -334,8 +334,8 @@ def test_one_build_at_a_time(few, tmp_path):
 @pytest.mark.skipif(WORKERS == 1, reason="joblib is not installed")
 def test_two_workers_give_the_same_bytes(few, tmp_path):
     told = []
-    site(few, tmp_path / "one")
-    site(few, tmp_path / "two", workers=2, tell=lambda *each: told.append(each))
+    write_site(few, tmp_path / "one")
+    write_site(few, tmp_path / "two", workers=2, tell=lambda *each: told.append(each))
     assert everything(tmp_path / "one") == everything(tmp_path / "two")
     assert (told[0], told[-1]) == (("pages", 0, 3), ("pages", 3, 3))
 
@@ -344,19 +344,19 @@ def test_on_the_command_line(few, tmp_path, capsys, monkeypatch):
     monkeypatch.delenv("HRSYNTH_DEBUG", raising=False)
     kept = tmp_path / "kept"
     kept.mkdir()
-    lines = sorted(map(line, few), key=lambda text: json.loads(text)["key"])
+    lines = sorted(map(format_line, few), key=lambda text: json.loads(text)["key"])
     head = json.dumps({"format": 2, "catalog": 1, "group": "none", "count": len(lines)})
     (kept / "none.jsonl").write_text("\n".join([head, *lines]) + "\n")
     common = ["catalog", "site", "--catalog", str(kept)]
-    assert execute([*common, "-o", str(tmp_path / "site"), "--legs", "2", "--json"]) == 0
+    assert run_command([*common, "-o", str(tmp_path / "site"), "--legs", "2", "--json"]) == 0
     out, err = capsys.readouterr()
     said = json.loads(out)
     assert (said["command"], said["architectures"], said["pages"], err) == ("catalog site", 1, 1, "")
     assert Path(said["index"]).is_file()
-    assert execute([*common, "-o", str(tmp_path / "site"), "--legs", "2"]) == 0
+    assert run_command([*common, "-o", str(tmp_path / "site"), "--legs", "2"]) == 0
     assert str(tmp_path / "site" / "index.html") in capsys.readouterr().out
     for arguments in (["-o", str(tmp_path / "kept")], ["-o", str(tmp_path / "site"), "--dof", "17"]):
-        assert execute([*common, *arguments]) == 2
+        assert run_command([*common, *arguments]) == 2
         out, err = capsys.readouterr()
         assert out == ""
         assert re.fullmatch(r"hrsynth: [^\n]+\n", err)

@@ -9,11 +9,11 @@ import pytest
 from browser import Tab
 from hrsynth.catalog import Catalog
 from hrsynth.catalog.architecture_key import parse
-from hrsynth.catalog.entry import entry
-from hrsynth.catalog.jsonl import line, record
-from hrsynth.catalog.site import index, site
-from hrsynth.catalog.site.structures import address_name, structures
-from hrsynth.present.palette import colour, tint
+from hrsynth.catalog.entry import build_entry
+from hrsynth.catalog.jsonl import format_line, parse_record
+from hrsynth.catalog.site import index, write_site
+from hrsynth.catalog.site.structures import group_structures, hash_name
+from hrsynth.present.palette import get_colour, make_tint
 
 pytestmark = pytest.mark.browser
 READY = "document.readyState == 'complete'"
@@ -24,7 +24,7 @@ LISTED = "document.querySelectorAll('#list tbody tr').length"
 def target(tmp_path_factory: pytest.TempPathFactory) -> Path:
     words = ("3(Rz*-Rz-Rz)", "3(Rz-Rz*-Rz)", "(Rz!-Rz-Rz*)+2(Rz*!-Rz-Rz)", "2(Rt*-2SSt)", "3(Ra*!-Rb-Ra-Ph)")
     folder = tmp_path_factory.mktemp("pages") / "site"
-    site(Catalog(tuple(record(line(entry(word))) for word in words)), folder)
+    write_site(Catalog(tuple(parse_record(format_line(build_entry(word))) for word in words)), folder)
     return folder
 
 
@@ -66,9 +66,9 @@ def test_a_page_shows_the_motors_of_the_architecture_that_was_chosen(tab: Tab, t
     assert [joint.get_attribute("data-joint") for joint in moved.all()] == [f"joint_{k}_2" for k in (1, 2, 3)]
     assert (
         moved.first.evaluate("each => getComputedStyle(each).fill")
-        == f"rgb{tuple(bytes.fromhex(tint(colour('motor'))[1:]))}"
+        == f"rgb{tuple(bytes.fromhex(make_tint(get_colour('motor'))[1:]))}"
     )
-    assert tab.page.locator("#file a").get_attribute("href") == f"../r/{address_name('3(Rz-Rz*-Rz)')}.urdf"
+    assert tab.page.locator("#file a").get_attribute("href") == f"../r/{hash_name('3(Rz-Rz*-Rz)')}.urdf"
     tab.page.locator("#variants").get_by_role("link", name="3-RRR").first.click()
     tab.page.wait_for_function("document.getElementById('word').textContent == '3(Rz*-Rz-Rz)'")
     assert moved.first.get_attribute("data-joint") == "joint_1_1"
@@ -84,7 +84,7 @@ def test_a_narrow_window_needs_no_scrolling_to_the_side(tab: Tab, target: Path):
 
 
 def test_twelve_thousand_records_are_filtered_within_a_moment(tab: Tab, target: Path, tmp_path: Path):
-    known = structures(record(line(entry(word))) for word in ("3(Rz*-Rz-Rz)", "2(Rt*-2SSt)"))
+    known = group_structures(parse_record(format_line(build_entry(word))) for word in ("3(Rz*-Rz-Rz)", "2(Rt*-2SSt)"))
     (tmp_path / "p").mkdir()
     index.write(tmp_path, known * 6000)
     tab.open(tmp_path / "index.html", f"{LISTED} == 50")
@@ -112,7 +112,7 @@ def test_a_search_finds_what_is_on_the_screen_and_known_names(tab: Tab, tmp_path
         {"key": word, "group": "none", "legs": len(parse(word).legs), "notation": notation}
         for word, notation in known.items()
     ]
-    index.write(tmp_path, structures(facts))
+    index.write(tmp_path, group_structures(facts))
     tab.open(tmp_path / "index.html", f"{LISTED} == 4")
     assert rows(tab)[-1] == "(Ph*-Pj-Rz)+2(Rz*-Rz-Rz)"
     for asked, found in (

@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hrsynth.catalog.architecture_key import COMPOSITE, ArchitectureKey, LegKey, parse
-from hrsynth.catalog.geometry import mechanism
+from hrsynth.catalog.geometry import build_mechanism
 from hrsynth.catalog.groups import GROUPS, group, words
 from hrsynth.errors import BadRequest
 from hrsynth.mechanism.legs import decompose
-from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.normal import reduce_to_normal_form
 
 
 @cache
@@ -98,10 +98,10 @@ def _renamed(leg, rng):
 @pytest.mark.parametrize("number", range(40))
 def test_a_mechanism_has_the_joints_of_its_word(name, number):
     word = parse(some(name)[number])
-    drawn = mechanism(word)
-    decomposition = decompose(normal_form(drawn).mechanism)
+    drawn = build_mechanism(word)
+    decomposition = decompose(reduce_to_normal_form(drawn).mechanism)
     assert decomposition.labels == tuple(str(k + 1) for k in range(len(word.legs)))
-    assert sum(joint.actuated for joint in drawn.joints.values()) == sum(
+    assert sum(joint.is_actuated for joint in drawn.joints.values()) == sum(
         j.motor for leg in word.legs for j in leg.joints
     )
     for number, leg in enumerate(word.legs, start=1):
@@ -110,9 +110,9 @@ def test_a_mechanism_has_the_joints_of_its_word(name, number):
 
 
 def test_the_same_word_has_the_same_geometry_whatever_is_driven():
-    one, other = mechanism(parse("3(Rz*-Rz-Rz)")), mechanism(parse("3(Rz-Rz*-Rz)"))
+    one, other = build_mechanism(parse("3(Rz*-Rz-Rz)")), build_mechanism(parse("3(Rz-Rz*-Rz)"))
     assert [d for d in one.differences(other) if not d.startswith("actuated")] == []
-    assert mechanism(parse("3(Rz*-Rz-Rz)"), attempt=1).differences(one)
+    assert build_mechanism(parse("3(Rz*-Rz-Rz)"), attempt=1).differences(one)
 
 
 @pytest.mark.parametrize(
@@ -147,6 +147,6 @@ def test_what_is_no_word_is_refused(text, told):
 
 def test_axes_of_a_u_must_be_at_right_angles():
     with pytest.raises(BadRequest, match="right angles"):
-        mechanism(parse("3(Uxk-Pl*-S)"))
+        build_mechanism(parse("3(Uxk-Pl*-S)"))
     with pytest.raises(BadRequest, match="other than n or q"):
-        mechanism(parse("3(Unq-Pl*-S)"))
+        build_mechanism(parse("3(Unq-Pl*-S)"))

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 
 from hrsynth.catalog.architecture_key import parse
-from hrsynth.catalog.entry import model
-from hrsynth.catalog.geometry import mechanism
-from hrsynth.geometry.vectors import Array, unit
+from hrsynth.catalog.entry import choose_study_model
+from hrsynth.catalog.geometry import build_mechanism
+from hrsynth.geometry.vectors import Array, normalise_vector
 from hrsynth.mechanism.legs import decompose
-from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.normal import reduce_to_normal_form
 from hrsynth.mechanism.observations.direction import Direction
-from hrsynth.mechanism.sensors import default_observation
+from hrsynth.mechanism.sensors import choose_default_segment
 from oracle import GAP, RANK, NotAssembled, Oracle, Undecided, exponential, split_rank
 
 STATES, STARTS, LONG = 6, 60, 40
@@ -38,8 +38,8 @@ class Witness:
 
     @cached_property
     def oracle(self) -> Oracle:
-        drawn = mechanism(model(parse(self.record["key"])), self.record.get("attempt", 0))
-        return Oracle(normal_form(drawn).mechanism)
+        drawn = build_mechanism(choose_study_model(parse(self.record["key"])), self.record.get("attempt", 0))
+        return Oracle(reduce_to_normal_form(drawn).mechanism)
 
     @cached_property
     def watched(self) -> dict[str, Direction]:
@@ -47,7 +47,7 @@ class Witness:
         decomposition = decompose(self.oracle.mechanism)
         marked = {each.leg: each for each in self.oracle.mechanism.observations if isinstance(each, Direction)}
         return {
-            leg.label: marked.get(leg.label) or default_observation(decomposition, leg) for leg in decomposition.legs
+            leg.label: marked.get(leg.label) or choose_default_segment(decomposition, leg) for leg in decomposition.legs
         }
 
     @cached_property
@@ -81,7 +81,11 @@ class Witness:
 
     def kinds(self, legs: Sequence[str]) -> tuple[str, ...]:
         """What the legs are: equal legs of one body can be exchanged."""
-        kinds = [f"{body}{leg}" for body, some in enumerate(model(parse(self.record["key"])).bodies) for leg in some]
+        kinds = [
+            f"{body}{leg}"
+            for body, some in enumerate(choose_study_model(parse(self.record["key"])).bodies)
+            for leg in some
+        ]
         return tuple(sorted(kinds[int(leg) - 1] for leg in legs))
 
     def weakest(self) -> float:
@@ -104,7 +108,7 @@ class Witness:
         for _ in range(STARTS):
             there = state.copy()
             for link in oracle.moving:
-                turn = exponential(rng.uniform(0, np.pi) * unit(rng.normal(size=3)))
+                turn = exponential(rng.uniform(0, np.pi) * normalise_vector(rng.normal(size=3)))
                 there[link, :3, :3] = turn @ there[link, :3, :3]
                 there[link, :3, 3] += 0.5 * oracle.length * rng.normal(size=3)
             try:
@@ -133,7 +137,7 @@ class Witness:
             for name in (rod, f"{rod[:-1]}b"):
                 upper, lower = (joints[name.replace("rod", end)].point for end in ("upper", "lower"))
                 chords.append(
-                    unit(
+                    normalise_vector(
                         oracle.pose(state, name)[:3, :3] @ oracle.zero()[oracle.index[name], :3, :3].T @ (lower - upper)
                     )
                 )

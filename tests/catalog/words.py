@@ -22,9 +22,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from hrsynth.analysis.observed import SAMPLES, ObservedRobot
+from hrsynth.analysis.observed import GENERIC_SAMPLES_COUNT, ObservedRobot
 from hrsynth.catalog.architecture_key import ArchitectureKey, parse
-from hrsynth.catalog.geometry import mechanism
+from hrsynth.catalog.geometry import build_mechanism
 from hrsynth.catalog.groups import GROUPS
 from hrsynth.errors import HrsynthError
 from hrsynth.kinematics.branch_tests import Signature
@@ -60,7 +60,7 @@ def ranks(setup: ObservedRobot) -> list[int]:
 def answer(text: str, dimensions: int, seed: int, samples: int) -> str:
     """The ranks of all leg sets for one seed, or how the robot is refused."""
     try:
-        setup = ObservedRobot.of(mechanism(parse(text), dimensions), samples=samples, seed=seed)
+        setup = ObservedRobot.of(build_mechanism(parse(text), dimensions), samples=samples, seed=seed)
     except HrsynthError as error:
         return f"{type(error).__name__}: {getattr(error, 'what', '')[:60]}"
     counts = f"{setup.dof} {setup.mobility.total} {setup.all_samples.signature.motion}"
@@ -127,7 +127,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("count", type=int)
     parser.add_argument("--dimensions", type=int, default=2)
     parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--samples", type=int, default=SAMPLES)
+    parser.add_argument("--samples", type=int, default=GENERIC_SAMPLES_COUNT)
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--output", type=Path, default=Path("words.jsonl"))
     parser.add_argument("--first", type=int, default=0)

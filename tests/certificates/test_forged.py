@@ -18,7 +18,7 @@ import pytest
 
 import hrsynth
 from hrsynth.certificates import verify_certificate as checker
-from hrsynth.errors import CertificateRefused, HrsynthError
+from hrsynth.errors import HrsynthError, InvalidCertificate
 
 Record = dict[str, Any]
 HALF = math.sqrt(3) / 4
@@ -333,7 +333,7 @@ FORGED: tuple[Callable[[], Record], ...] = (
 
 @pytest.mark.parametrize("forged", FORGED, ids=lambda each: each.__name__)
 def test_a_forged_certificate_is_refused(forged):
-    with pytest.raises(checker.NotAccepted):
+    with pytest.raises(checker.CertificateRejection):
         print(checker.verify(forged()))
 
 
@@ -348,21 +348,21 @@ def test_a_forged_certificate_is_refused(forged):
 )
 def test_a_chart_is_four_independent_rows_of_integers(chart):
     record = {"chart": chart, "arrows": 0, "hub": ["0"] * 3, "reaches": [{"point": text([[0, 0, 0]])}]}
-    with pytest.raises((checker.NotAccepted, ValueError)):
+    with pytest.raises((checker.CertificateRejection, ValueError)):
         checker.pose(record, [[Fraction(0)] * 3])
 
 
 @pytest.mark.parametrize("groups", [[[[k], 12, 0] for k in range(4)], [[[0, 1, 2, 3], 2, 0], *[[[], 1, 0]] * 10**6]])
 def test_a_bound_is_found_at_once(groups):
     """Caps of 12 are 28,561 monomials; groups of nothing have no end."""
-    with pytest.raises(checker.NotAccepted):
+    with pytest.raises(checker.CertificateRejection):
         checker.rank([{(0, 0, 0, 0): 1}], [False] * 4, {"bound": {"groups": groups}})
 
 
 def test_a_reason_holds_nothing_that_a_terminal_obeys():
     system = sound()
     system["reaches"] = [{"\x1b[2K\raccepted: 4 real of 8": []}]
-    with pytest.raises(checker.NotAccepted) as reason:
+    with pytest.raises(checker.CertificateRejection) as reason:
         checker.verify(certificate(2, 2, system))
     assert str(reason.value).isprintable()
 
@@ -370,7 +370,7 @@ def test_a_reason_holds_nothing_that_a_terminal_obeys():
 def test_no_key_is_told_twice(tmp_path):
     path = tmp_path / "c.json"
     path.write_text(json.dumps(certificate(2, 2, sound())).replace('"real"', '"real": 4, "real"'))
-    with pytest.raises(CertificateRefused, match="twice"):
+    with pytest.raises(InvalidCertificate, match="twice"):
         hrsynth.verify(path)
     for content in (path.read_text(), "[" * 200_000):
         path.write_text(content)

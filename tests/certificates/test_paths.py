@@ -18,8 +18,8 @@ import pytest
 
 import hrsynth
 from hrsynth.certificates import verify_path as checker
-from hrsynth.cli import execute
-from hrsynth.errors import CertificateRefused, NoCertificate
+from hrsynth.cli import run_command
+from hrsynth.errors import InvalidCertificate, NoCertificate
 
 FILE = Path(checker.__file__)
 PATHS = {
@@ -60,7 +60,7 @@ def test_what_is_certified_is_accepted(name, tmp_path):
     done = subprocess.run([sys.executable, "-I", str(FILE), str(path)], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith("accepted: same aspect: ")
-    with pytest.raises(CertificateRefused, match="not for"):
+    with pytest.raises(InvalidCertificate, match="not for"):
         hrsynth.verify(record, "delta" if name != "delta" else "orthoglide")
 
 
@@ -84,14 +84,14 @@ def test_no_path_between_separated_poses_is_accepted():
             "path": nodes,
             "ends": [nodes[0], nodes[-1]],
         }
-        with pytest.raises(checker.PathNotAccepted):
+        with pytest.raises(checker.PathRejection):
             checker.verify(sealed(false))
 
 
 def test_one_aspect_is_not_told_to_be_two():
     record = json.loads(of("3rrr_m1"))
     false = record | {"verdict": "separated", "modes": record["modes"] * 2, "path": record["ends"]}
-    with pytest.raises(checker.PathNotAccepted, match="one sign"):
+    with pytest.raises(checker.PathRejection, match="one sign"):
         checker.verify(sealed(false))
 
 
@@ -125,7 +125,7 @@ def judged(record, modes):
     """What the checker says of a separation in other working modes."""
     try:
         return checker.verify(sealed(record | {"modes": modes})).split(":")[0]
-    except checker.PathNotAccepted as reason:
+    except checker.PathRejection as reason:
         return str(reason)
 
 
@@ -158,7 +158,7 @@ def test_no_float_rounds_a_zero_away(sense, mode):
         "ends": [node, node],
         "condition": ["+", ["*", "3", along, along], ["*", "-3", "3/5", along]],
     }
-    with pytest.raises(checker.PathNotAccepted):
+    with pytest.raises(checker.PathRejection):
         checker.verify(sealed(false))
     false["condition"] = along
     if type(sense) is type(mode) is int:
@@ -276,7 +276,7 @@ def test_forgeries_are_refused_with_a_reason(name):
     change, why = FORGERIES[name]
     record = json.loads(of("3rrr_m1"))
     change(record)
-    with pytest.raises(checker.PathNotAccepted, match=why):
+    with pytest.raises(checker.PathRejection, match=why):
         checker.verify(sealed(record))
 
 
@@ -285,7 +285,7 @@ def test_forgeries_are_refused_with_a_reason(name):
 def test_what_is_true_of_another_robot_is_refused_for_this(name):
     record = json.loads(separated() if "question" in name else of("3rrr_m1"))
     FOR_ANOTHER[name](record)
-    with pytest.raises(CertificateRefused):
+    with pytest.raises(InvalidCertificate):
         hrsynth.verify(sealed(record), "3rrr_m1")
 
 
@@ -389,7 +389,7 @@ def mutated(name, count):
             record["ends"][end] = rng.choice((node, node, record["ends"][end]))
         try:
             checker.verify(sealed(record))
-        except checker.PathNotAccepted:
+        except checker.PathRejection:
             continue
         accepted += 1
         assert holds(record), record
@@ -444,7 +444,7 @@ def attacked(name, count):
     for _ in range(count):
         record = json.loads(of(name))
         changed = spoil(record, rng)
-        with pytest.raises(checker.PathNotAccepted):
+        with pytest.raises(checker.PathRejection):
             print(changed, checker.verify(json.loads(changed)))
     return count
 
@@ -497,11 +497,11 @@ def test_what_has_no_certificate_says_why():
 def test_command_line(tmp_path, capsys):
     path = tmp_path / "c.json"
     assert (
-        execute(["path", "3rrr_m1", "--start", "x=0,y=0,phi=0", "--goal", "x=0.02,y=0", "--certificate", str(path)])
+        run_command(["path", "3rrr_m1", "--start", "x=0,y=0,phi=0", "--goal", "x=0.02,y=0", "--certificate", str(path)])
         == 0
     )
     assert f"The certificate is written to {path}." in capsys.readouterr().out
-    assert execute(["verify", str(path), "--robot", "3rrr_m1"]) == 0
+    assert run_command(["verify", str(path), "--robot", "3rrr_m1"]) == 0
     assert capsys.readouterr().out.startswith("accepted: same aspect: ")
     path.write_text(path.read_text().replace("same aspect", "separated"))
-    assert execute(["verify", str(path)]) == 3
+    assert run_command(["verify", str(path)]) == 3

@@ -118,9 +118,9 @@ def screw_lever() -> Mechanism:
 def box_of(robot: Mechanism, half: float) -> dict[str, tuple[float, float]]:
     """A box of motors, half as wide as ``half`` rad or half characteristic lengths."""
     return {
-        name: ((-half, half) if not joint.type.slides else (-half * robot.length, half * robot.length))
+        name: ((-half, half) if not joint.type.has_translation else (-half * robot.length, half * robot.length))
         for name, joint in robot.joints.items()
-        if joint.actuated
+        if joint.is_actuated
     }
 
 
@@ -146,7 +146,7 @@ class Motors:
         step = model.difference(model.q0, q)
         J, error = np.zeros((len(self.values), model.nv)), np.zeros(len(self.values))
         for k, (name, value) in enumerate(self.values.items()):
-            unit = model.length if model.mechanism.joints[name].type.slides else 1.0
+            unit = model.length if model.mechanism.joints[name].type.has_translation else 1.0
             (i,) = model.coordinates[name]
             J[k, i], error[k] = 1.0, step[i] - value / unit
         return error, J

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hrsynth.codegen.cell_tree import OUTSIDE, cell_tree, tree_depth
+from hrsynth.codegen.cell_tree import OUTSIDE, build_cell_tree, compute_tree_depth
 from hrsynth.geometry.vectors import Array
 
 
@@ -26,7 +26,7 @@ def test_a_point_is_found_in_the_cell_that_holds_it(seed: int) -> None:
     m = 1 + seed % 4
     low, high = -rng.uniform(0.1, 2, m), rng.uniform(0.1, 2, m)
     cells = halved(rng, low, high, 7)
-    root, nodes = cell_tree(low, high, cells)
+    root, nodes = build_cell_tree(low, high, cells)
     points = rng.uniform(low, high, (400, m))
     corners = np.array([corner for cell in cells for corner in cell]).reshape(-1, m)
     for q in [*points, *corners]:
@@ -38,7 +38,7 @@ def test_a_point_is_found_in_the_cell_that_holds_it(seed: int) -> None:
                 if q[axis] == value:
                     waiting.append(below)
                 at = below if q[axis] < value else above
-            assert len(waiting) <= tree_depth(root, nodes)
+            assert len(waiting) <= compute_tree_depth(root, nodes)
         holding = [i for i, (a, b) in enumerate(cells) if np.all(a <= q) and np.all(q <= b)]
         assert (at == OUTSIDE) == (not holding)
         assert at == OUTSIDE or ~at in holding

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 import hrsynth
 from codegen.robots import box_of, module_of
 from codegen.test_points import FORMS, HALF, made
-from hrsynth.analysis.branch.carried_vectors import SweptChains, Total, add_bend, row_product
-from hrsynth.analysis.branch.loops import loop_system, residuals
-from hrsynth.budgets import NEWTON_STEPS_AT_RUN
+from hrsynth.analysis.branch.carried_vectors import SweptChains, Total, add_bend, build_row_product
+from hrsynth.analysis.branch.loops import build_loop_system, evaluate_residuals
+from hrsynth.budgets import GENERATED_NEWTON_STEPS_MAX
 from hrsynth.codegen import convergence
 from hrsynth.codegen.branch_cells import TubedBranch
 from hrsynth.codegen.export import export
@@ -122,18 +122,18 @@ def test_steps_and_errors_of_every_form(name: str) -> None:
 def test_second_derivatives_of_loops(name: str, seed: int) -> None:
     """They are those of the first ones, by differences."""
     robot, rng = hrsynth.load(name), np.random.default_rng(seed)
-    system = loop_system(robot, [each for each, joint in robot.joints.items() if joint.actuated])
+    system = build_loop_system(robot, [each for each, joint in robot.joints.items() if joint.is_actuated])
     values, h = rng.uniform(-0.7, 0.7, len(system.coordinates)), 1e-5
     carrier = SweptChains(system, [values[None, i] for i in range(len(values))])
     for loop in system.loops:
         whole = [Total(np.zeros(1), 2 * (len(values),)) for _ in loop.rows]
         for bend, row in zip(whole, loop.rows, strict=True):
-            add_bend(bend, row_product(carrier, loop, row))
+            add_bend(bend, build_row_product(carrier, loop, row))
         for j in loop.coordinates:
             moved = values.copy(), values.copy()
             moved[0][j] += h
             moved[1][j] -= h
-            up, down = (residuals(system, loop, list(each), loop.rows)[1] for each in moved)
+            up, down = (evaluate_residuals(system, loop, list(each), loop.rows)[1] for each in moved)
             for bend, after, before in zip(whole, up, down, strict=True):
                 for i in after:
                     rate = (np.asarray(after[i]) - np.asarray(before[i])) / (2 * h)
@@ -214,11 +214,11 @@ def test_faces_of_cells_are_answered() -> None:
 
 def test_a_cell_without_a_bound_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where cells are not halved some have none: the program says so, and takes the usual steps."""
-    monkeypatch.setattr(convergence, "BOUND_HALVINGS", 0)
+    monkeypatch.setattr(convergence, "BOUND_SIDE_HALVINGS_MAX", 0)
     robot = made("four_bar")
     found = export(robot, "numpy", box_of(robot, HALF["four_bar"]))
     assert found.bounds is None
     assert found.to_dict()["steps"] is found.to_dict()["error"] is None
     assert "is not proved in all cells" in found.code
     assert "not bounded in all cells" in describe_export(found)
-    assert module_of(found.code).STEPS == NEWTON_STEPS_AT_RUN
+    assert module_of(found.code).STEPS == GENERATED_NEWTON_STEPS_MAX

@@ -33,8 +33,8 @@ from codegen.robots import (
 from hrsynth.analysis.branch.answer import Toggle
 from hrsynth.codegen.branch_cells import TubedBranch
 from hrsynth.codegen.export import ExportedCode, export
-from hrsynth.codegen.languages import namespace
-from hrsynth.errors import BadRequest, NothingProved
+from hrsynth.codegen.languages import make_namespace
+from hrsynth.errors import BadRequest, NoProvedCell
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism import Mechanism
@@ -257,7 +257,7 @@ def test_limits_of_joints_without_a_motor(lower: float | None, upper: float | No
 def test_motors_that_the_box_takes_beyond_their_limits_are_told() -> None:
     robot = four_bar()
     limited = robot.changed(
-        joints=[replace(each, limits=Limits(-0.2, 0.3)) if each.actuated else each for each in robot.joints.values()]
+        joints=[replace(each, limits=Limits(-0.2, 0.3)) if each.is_actuated else each for each in robot.joints.values()]
     )
     wide, within = ({"motor": (-half, half)} for half in (0.25, 0.2))
     assert "motor -0.2 to 0.3 (within -0.25 to 0.25)" in export(limited, box=wide).code
@@ -382,7 +382,7 @@ def test_what_is_refused() -> None:
 
 
 def test_what_is_watched_is_refused_before_the_proof(monkeypatch: pytest.MonkeyPatch) -> None:
-    from hrsynth.description.observation_text import parse_see, with_sights
+    from hrsynth.description.observation_text import add_observations, parse_see
 
     monkeypatch.setattr("hrsynth.codegen.export.branch", lambda *_: pytest.fail("the proof has begun"))
     robot = four_bar()
@@ -393,7 +393,7 @@ def test_what_is_watched_is_refused_before_the_proof(monkeypatch: pytest.MonkeyP
         with pytest.raises(BadRequest, match=match):
             export(robot, **wrong)
     with pytest.raises(BadRequest, match="directions of segments only: got 'point point_1'"):
-        export(with_sights(robot, [parse_see(f"point:{robot.platform}@0,0,0.1", [])]))
+        export(add_observations(robot, [parse_see(f"point:{robot.platform}@0,0,0.1", [])]))
 
 
 SMALL = {"3rrr_m1": 0.02, "3prr_m1": 0.02, "rrrrr_m2": 0.05, "prrrp_m1": 0.05, "3rps": 0.01, "3rpr_m1": 0.02}
@@ -436,7 +436,7 @@ def test_the_page_s_loop_runs(tmp_path: Path) -> None:
 def test_files_of_other_dialects(tmp_path: Path, ending: str) -> None:
     robot = hrsynth.load("rrrrr_m1")
     hrsynth.save(robot, tmp_path / f"five_bar{ending}")
-    motors = [name for name, joint in robot.joints.items() if joint.actuated]
+    motors = [name for name, joint in robot.joints.items() if joint.is_actuated]
     again = hrsynth.load(tmp_path / f"five_bar{ending}", platform=robot.platform, motors=motors)
     one, other = (exported(each, 0.1) for each in (robot, again))
     assert one.proof.motors == other.proof.motors
@@ -513,7 +513,7 @@ def test_names_are_no_code(name: str, tmp_path: Path) -> None:
     exec(compile(path.read_bytes(), str(path), "exec"), made)
     assert made["MOTOR_NAMES"] == ['motor "*/ ???/ q\n\\']
     assert made["forward"](np.zeros((1, 1)))[0].tolist() == [made["OK"]]
-    assert namespace(name) == ODD[name]
+    assert make_namespace(name) == ODD[name]
 
 
 @pytest.mark.slow
@@ -521,7 +521,7 @@ def test_names_are_no_code(name: str, tmp_path: Path) -> None:
 def test_names_are_no_code_in_cpp(name: str, tmp_path: Path) -> None:
     robot = oddly_named(name)
     code = export(robot, "c++", box_of(robot, 0.1)).code
-    own = namespace(robot.name)
+    own = make_namespace(robot.name)
     main = (
         f'#include "robot.hpp"\n#include <cstdio>\nusing namespace {own};\n'
         "int main() { return int(unique(Motors::Zero())) + std::puts(MOTOR_NAMES[0]) < 0; }"
@@ -557,7 +557,7 @@ def test_no_name_of_the_c_library_is_a_namespace(tmp_path: Path) -> None:
         {each for each in names if re.fullmatch("[a-z][a-z0-9_]*", each) and not re.search("f[0-9]+x?$", each)}
         | {"gamma", "y0", "int8_t", "FILE", "INT_MAX", "CHAR_BIT", "FE_INVALID"}
     )
-    lines = [f"namespace {namespace(each)} {{}}" for each in names]
+    lines = [f"namespace {make_namespace(each)} {{}}" for each in names]
     (tmp_path / "main.cpp").write_text(
         "\n".join(["#include <Eigen/Core>", "#include <cstdio>", "#include <ctime>", "#include <iostream>", *lines])
     )
@@ -568,7 +568,7 @@ def test_no_name_of_the_c_library_is_a_namespace(tmp_path: Path) -> None:
         text=True,
     )
     assert done.returncode == 0, done.stderr[:2000]
-    assert [namespace(each) for each in ("delta", "MYROBOT", "EXO_2", "irb_140t")] == [
+    assert [make_namespace(each) for each in ("delta", "MYROBOT", "EXO_2", "irb_140t")] == [
         "delta",
         "MYROBOT",
         "EXO_2",
@@ -594,7 +594,7 @@ def test_why_nothing_is_proved_is_said_once_with_the_nearest_place():
         for q, reason in (([2.0, 0.0], "it toggles"), ([0.0, 0.5], "it toggles"), ([1.0, 1.0], "it is too small"))
     )
     with pytest.raises(
-        NothingProved,
+        NoProvedCell,
         match=re.escape(
             "it toggles (at shoulder_1=0, shoulder_2=0.5); it is too small (at shoulder_1=1, shoulder_2=1); try"
         ),

@@ -14,7 +14,7 @@ import pytest
 import hrsynth
 from codegen.robots import MAIN, answered, compiled, module_of
 from hrsynth.errors import BadRequest
-from hrsynth.geometry.vectors import Array, pose, rotation_about
+from hrsynth.geometry.vectors import Array, build_pose, rotate_about_axis
 
 AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
 
@@ -51,7 +51,7 @@ class FileJoint:
 
     def displacement(self, value: float) -> Array:
         axis = np.array(AXES[self.axis], dtype=float)
-        return pose(value * axis) if self.slides else pose(rotation=rotation_about(axis, value))
+        return build_pose(value * axis) if self.slides else build_pose(rotation=rotate_about_axis(axis, value))
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class Case:
         for joint in self.joints:
             if joint.closes is None:
                 moved = joint.displacement(values.get(joint.name, 0.0))
-                found[joint.child] = found[joint.parent] @ pose(joint.at) @ moved
+                found[joint.child] = found[joint.parent] @ build_pose(joint.at) @ moved
         return found
 
 

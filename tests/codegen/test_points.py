@@ -111,7 +111,7 @@ def differs(name: str, count: int, folder: Path | None) -> float:
     status, x, R, p = module.forward(q[order])
     assert np.all(status == 0)
     off = max(np.abs(R - X[order, :3, :3]).max(), np.abs(p - X[order, :3, 3]).max() / robot.length)
-    units = np.array([robot.length if robot.joints[name].type.slides else 1.0 for name in found.proof.motors])
+    units = np.array([robot.length if robot.joints[name].type.has_translation else 1.0 for name in found.proof.motors])
     if found.closed:
         status, back = module.inverse(X[order, :3, :3], X[order, :3, 3])
         assert np.all(status == 0)
@@ -163,7 +163,7 @@ def check_motors_of_poses(name: str, count: int) -> None:
     assert set(status[~inside]) == {made.OUTSIDE}
     assert np.isnan(back[~inside]).all()
     assert set(status[inside]) == {made.OK}
-    units = np.array([robot.length if robot.joints[each].type.slides else 1.0 for each in found.proof.motors])
+    units = np.array([robot.length if robot.joints[each].type.has_translation else 1.0 for each in found.proof.motors])
     np.testing.assert_allclose(back[inside] / units, q[inside] / units, rtol=0, atol=1e-12)
     far = made.inverse(X[inside, :3, :3], X[inside, :3, 3] + 30 * robot.length * np.array([1.0, 0.5, 0.2]))[0]
     assert set(far) <= {made.UNREACHED, made.OUTSIDE}

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import sympy
 
-from hrsynth.constraints.closed_conditions import ClosedForm, closed_form
+from hrsynth.constraints.closed_conditions import ClosedForm, find_closed_form
 from hrsynth.constraints.locked_legs import LockedLeg
 from hrsynth.constraints.named_vectors import BodyPoint, BodyVector, CrossProduct
 from hrsynth.constraints.vector_algebra import evaluate
@@ -41,7 +41,7 @@ def held(kind: str, number: int, eye: str | None) -> LockedLeg:
 
 
 def form_of(kinds: str, eye: str | None = "C") -> ClosedForm:
-    found = closed_form([held(kind, number, eye) for number, kind in enumerate(kinds, 1)])
+    found = find_closed_form([held(kind, number, eye) for number, kind in enumerate(kinds, 1)])
     assert found is not None
     return found
 

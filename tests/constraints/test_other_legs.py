@@ -8,8 +8,8 @@ import sympy
 
 from hrsynth.analysis.check import check
 from hrsynth.analysis.singularity.singularities import Singularity, singularities
-from hrsynth.geometry.vectors import Array, hat, unit
-from hrsynth.kinematics.walking import random_walk
+from hrsynth.geometry.vectors import Array, hat, normalise_vector
+from hrsynth.kinematics.walking import walk_randomly
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Mechanism
 from oracle import Oracle
@@ -30,7 +30,7 @@ def on_a_table() -> Mechanism:
         foot, tip = 0.3 * out, 0.1 * out
         knee, level = foot + 0.4 * (np.cos(lean) * out + np.sin(lean) * UP), foot + 0.4 * out - SHIFT
         tip[2] = (level @ level - knee @ knee - 2 * tip @ (level - knee)) / (2 * (level - knee)[2])
-        inner = unit(np.cross(across, tip - knee))
+        inner = normalise_vector(np.cross(across, tip - knee))
         made.joint(f"crank_{k}", "R", "base", f"arm_{k}", foot, axis=across, motor=True)
         made.joint(f"knee_{k}", "U", f"arm_{k}", f"rod_{k}", knee, axis=across, axis2=inner)
         made.joint(f"end_{k}", "U", f"rod_{k}", "platform", tip, axis=inner, axis2=across, loop=True)
@@ -41,7 +41,7 @@ def on_a_table() -> Mechanism:
 def tangent(robot: Mechanism, state: Array, oracle: Oracle, k: int) -> Array:
     """Of the path of a crank's end, by link poses."""
     knee = (oracle.pose(state, f"arm_{k}") @ np.append(robot.joints[f"knee_{k}"].point, 1.0))[:3]
-    return unit(np.cross(robot.joints[f"crank_{k}"].axis, knee - robot.joints[f"crank_{k}"].point))
+    return normalise_vector(np.cross(robot.joints[f"crank_{k}"].axis, knee - robot.joints[f"crank_{k}"].point))
 
 
 @pytest.mark.slow
@@ -85,7 +85,13 @@ def turning_on_a_table(turns: tuple[float, ...]) -> Mechanism:
         knee = foot + 0.4 * (np.cos(0.3 + 0.2 * k) * out + np.sin(0.3 + 0.2 * k) * UP)
         made.joint(f"crank_{k}", "R", "base", f"arm_{k}", foot, axis=across, motor=True)
         made.joint(
-            f"knee_{k}", "U", f"arm_{k}", f"rod_{k}", knee, axis=across, axis2=unit(np.cross(across, tip - knee))
+            f"knee_{k}",
+            "U",
+            f"arm_{k}",
+            f"rod_{k}",
+            knee,
+            axis=across,
+            axis2=normalise_vector(np.cross(across, tip - knee)),
         )
         made.joint(f"end_{k}", "S", f"rod_{k}", "platform", tip, loop=True)
         made.observe(f"rod {k}", f"rod_{k}", tip - knee)
@@ -123,7 +129,7 @@ def test_tips_that_leave_the_plane_of_motion_have_no_lines_in_it(turns: tuple[fl
     assert answer.condition is not None
     assert "lines through" not in answer.words
     oracle = Oracle(robot)
-    for at in [*random_walk(answer.setup.all_samples.start, 20, seed=1), *(e.configuration for e in answer.examples)]:
+    for at in [*walk_randomly(answer.setup.all_samples.start, 20, seed=1), *(e.configuration for e in answer.examples)]:
         state = np.array([at.pose(link) for link in robot.links])
         basis = oracle.relation(state, list(robot.observations))
         left = np.linalg.svd(basis[6:], compute_uv=False)[-1]

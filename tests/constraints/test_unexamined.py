@@ -14,15 +14,15 @@ from adversary.search import solve
 from analysis.singularity.found import found
 from analysis.singularity.test_never_in_loops import Z, joint, loop
 from hrsynth.analysis.check import check
-from hrsynth.analysis.singularity.locus import locus
+from hrsynth.analysis.singularity.locus import compute_locus
 from hrsynth.analysis.singularity.singularities import singularities
-from hrsynth.constraints.condition import Named
+from hrsynth.constraints.condition import NamedCondition
 from hrsynth.description import load
-from hrsynth.geometry.vectors import Array, hat, unit
+from hrsynth.geometry.vectors import Array, hat, normalise_vector
 from hrsynth.mechanism.model import Mechanism
 from hrsynth.mechanism.observations.direction import Direction
-from hrsynth.present.maps import _drawn_locus
-from hrsynth.present.text.poses import singularity
+from hrsynth.present.maps import _draw_locus_curve
+from hrsynth.present.text.poses import format_singularity
 from oracle import Oracle
 
 ROBOTS = Path(__file__).resolve().parents[2] / "robots"
@@ -65,7 +65,7 @@ def test_a_3_upu_loses_a_turn_where_its_two_watched_directions_are_not_parallel(
     assert values[-1] < 1e-6 < 1e-2 < values[-2]
     assert np.linalg.norm(oracle.twist(right[-1], robot.platform)[3:]) > 0.1
     assert any("constraint singularities" in each for each in answer.unexamined)
-    assert "constraint singularities" in singularity(answer)
+    assert "constraint singularities" in format_singularity(answer)
     assert len(posture.gained) == posture.dof - answer.verdict.dof == 1
 
 
@@ -129,7 +129,7 @@ def test_a_tool_at_the_dead_point_of_its_tie_turns_though_the_halves_rest(tmp_pa
     file = Robot.read(path)
     tool, tie = (np.subtract(*file.centres[link][1::-1]) for link in ("tool", "tie"))
     items, count = file.loops.items, len(file.loops.items.links)
-    links, local = [file.number("tool"), file.number("tie")], [unit(tool), unit(tie)]
+    links, local = [file.number("tool"), file.number("tie")], [normalise_vector(tool), normalise_vector(tie)]
     line = replace(
         file.loops,
         same=np.vstack([file.loops.same, [count, count + 1]]),
@@ -145,7 +145,7 @@ def test_a_tool_at_the_dead_point_of_its_tie_turns_though_the_halves_rest(tmp_pa
     kernel = np.linalg.svd(basis[6:])[2][-1]
     assert np.linalg.norm(basis[6:] @ kernel) < 1e-9
     assert np.linalg.norm((basis[:6] @ kernel)[3:]) > 0.1
-    assert not isinstance(answer.condition, Named)
+    assert not isinstance(answer.condition, NamedCondition)
 
 
 @pytest.mark.parametrize(("robot", "legs"), [("3rrr_m1", None), ("rrrrr_m1", None), ("3rps", None)])
@@ -158,5 +158,5 @@ def test_nothing_is_left_out_where_the_legs_leave_no_other_motion(robot: str, le
     [("3puu", "(never where examined)"), pytest.param("prrrp_m1", "(never)", marks=pytest.mark.slow)],
 )
 def test_the_legend_of_a_locus_says_where_never_was_examined(robot: str, legend: str) -> None:
-    field = locus(load(robot), steps=5).hidden
-    assert _drawn_locus(None, None, field, "hidden robot").get_label().endswith(legend)
+    field = compute_locus(load(robot), steps=5).hidden
+    assert _draw_locus_curve(None, None, field, "hidden robot").get_label().endswith(legend)

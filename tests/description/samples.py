@@ -7,7 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from hrsynth.geometry.vectors import Array, frozen, perpendicular, pose, rotation_about, unit
+from hrsynth.geometry.vectors import (
+    Array,
+    build_pose,
+    find_perpendicular,
+    freeze_array,
+    normalise_vector,
+    rotate_about_axis,
+)
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Joint, JointType, Limits, Link, Mechanism, Motor
 from hrsynth.mechanism.observations.direction import Direction
@@ -63,7 +70,7 @@ def with_rods(legs: int = 3) -> Mechanism:
     builder.link("base")
     builder.link("platform", at=(0, 0, -0.8))
     for leg in range(legs):
-        R = rotation_about((0, 0, 1), 2 * np.pi * leg / legs)
+        R = rotate_about_axis((0, 0, 1), 2 * np.pi * leg / legs)
         arm = f"arm_{leg}"
         builder.link(arm, at=R @ (0.2, 0, 0), rotation=R)
         builder.joint(f"shoulder_{leg}", "R", "base", arm, R @ (0.2, 0, 0), axis=R @ (0, 1, 0), motor=True)
@@ -80,13 +87,13 @@ def rotation(rng: np.random.Generator) -> Array:
     """A rotation; one in four has a pitch of ±90° or nearly so, one in eight is none."""
     if rng.random() < 0.125:
         return np.eye(3)
-    R = rotation_about(rng.normal(size=3), rng.uniform(0, 3))
+    R = rotate_about_axis(rng.normal(size=3), rng.uniform(0, 3))
     if rng.random() < 0.25:
         near = rng.choice([0.0, 1e-14, 1e-12, 1e-10, 1e-8, 1e-5, 1e-3])
         R = (
-            rotation_about((0, 0, 1), rng.uniform(-3, 3))
-            @ rotation_about((0, 1, 0), np.pi / 2 - near)
-            @ rotation_about((1, 0, 0), rng.uniform(-3, 3))
+            rotate_about_axis((0, 0, 1), rng.uniform(-3, 3))
+            @ rotate_about_axis((0, 1, 0), np.pi / 2 - near)
+            @ rotate_about_axis((1, 0, 0), rng.uniform(-3, 3))
         )
     return R
 
@@ -99,8 +106,8 @@ def every_joint(tree: Sequence[JointType], loops: Sequence[JointType], seed: int
     joints: list[Joint] = []
 
     def joint(name: str, kind: JointType, ends: tuple[str, str], point: Array, in_tree: bool) -> Joint:
-        first = unit(rng.normal(size=3))
-        axes = (first, perpendicular(first, rng.normal(size=3)))[: kind.axes]
+        first = normalise_vector(rng.normal(size=3))
+        axes = (first, find_perpendicular(first, rng.normal(size=3)))[: kind.axes]
         driven = kind is not JointType.FIXED and rng.random() < 0.5
         limits = None
         if rng.random() < 0.4:
@@ -112,7 +119,7 @@ def every_joint(tree: Sequence[JointType], loops: Sequence[JointType], seed: int
         return Joint(name, kind, *ends, point, axes, motor, limits, in_tree, content)
 
     for number, kind in enumerate(tree):
-        frame = pose(rng.normal(size=3) * scale, rotation(rng))
+        frame = build_pose(rng.normal(size=3) * scale, rotation(rng))
         parent = links[rng.integers(len(links))].name
         content = ("@flavour=a = 'b'", '<inertial><mass value="1"/></inertial>') if rng.random() < 0.3 else ()
         point = frame[:3, 3] if rng.random() < 0.5 else rng.normal(size=3) * scale
@@ -137,7 +144,7 @@ def every_joint(tree: Sequence[JointType], loops: Sequence[JointType], seed: int
 
 def moved(mechanism: Mechanism, X: Array) -> Mechanism:
     """The whole geometry, the base link's frame included, seen from another frame."""
-    links = {name: replace(link, pose=frozen(X @ link.pose)) for name, link in mechanism.links.items()}
+    links = {name: replace(link, pose=freeze_array(X @ link.pose)) for name, link in mechanism.links.items()}
     joints = {
         name: replace(each, point=X[:3, :3] @ each.point + X[:3, 3], axes=tuple(X[:3, :3] @ axis for axis in each.axes))
         for name, each in mechanism.joints.items()

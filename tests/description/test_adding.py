@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from hrsynth.description import formats, load, save, spanning
+from hrsynth.description import build_spanning_mechanism, formats, load, save
 from hrsynth.errors import BadRequest, BadRobotFile
 
 PAGE = Path(__file__).parents[2] / "docs" / "pages" / "adding.md"
@@ -26,9 +26,9 @@ def sample(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         (folder / f"{name}.py").write_text(source, encoding="utf-8")
     (tmp_path / "four_bar.bars").write_text(text)
     monkeypatch.setattr(formats, "__path__", [*formats.__path__, str(folder.parent)])
-    formats.dialects.cache_clear()
+    formats.list_formats.cache_clear()
     yield tmp_path / "four_bar.bars"
-    formats.dialects.cache_clear()
+    formats.list_formats.cache_clear()
     for name in [name for name in sys.modules if name.startswith(f"{formats.__name__}.bars")]:
         del sys.modules[name]
 
@@ -37,9 +37,9 @@ def test_the_dialect_of_the_page_is_read_and_written(sample: Path):
     robot = load(sample)
     assert robot.platform == "coupler"
     assert [str(joint.type) for joint in robot.joints.values()] == ["R"] * 4
-    assert [name for name, joint in robot.joints.items() if joint.actuated] == ["a"]
+    assert [name for name, joint in robot.joints.items() if joint.is_actuated] == ["a"]
     assert save(load("3rrr_m1"), sample.with_name("out.bars")) == ()
-    back, there = load(sample.with_name("out.bars")), spanning(load("3rrr_m1"))
+    back, there = load(sample.with_name("out.bars")), build_spanning_mechanism(load("3rrr_m1"))
     assert {name: joint.links for name, joint in back.joints.items()} == {
         name: joint.links for name, joint in there.joints.items()
     }

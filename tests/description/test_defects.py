@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from description.samples import FOUR_BAR
 from hrsynth.description import load, native
-from hrsynth.errors import BadRobotFile, LoopsNotClosed
+from hrsynth.errors import BadRobotFile, LoopClosureFailure
 
 UNIVERSAL = ('<loop name="d" type="revolute">', '<loop name="d" type="universal">')
 
@@ -329,7 +329,7 @@ def test_a_name_is_one_line(sign: str):
     ],
 )
 def test_an_open_loop_is_named_with_its_residual(changes: list, residual: float):
-    with pytest.raises(LoopsNotClosed) as caught:
+    with pytest.raises(LoopClosureFailure) as caught:
         native.parse(edited(*changes), "robot.urdf")
     error = caught.value
     assert (error.exit_status, error.loop) == (3, "d")
@@ -362,7 +362,7 @@ def test_a_damaged_file_is_read_or_refused_but_never_breaks(data: st.DataObject)
     for _ in range(data.draw(st.integers(1, 4))):
         at = data.draw(st.integers(0, len(text)))
         text = text[:at] + data.draw(st.sampled_from(words)) + text[at + data.draw(st.integers(0, 8)) :]
-    with contextlib.suppress(BadRobotFile, LoopsNotClosed):
+    with contextlib.suppress(BadRobotFile, LoopClosureFailure):
         robot = native.parse(text, "x")
         again = native.parse(native.write(robot))
         assert again.platform == robot.platform

@@ -61,7 +61,7 @@ def test_a_file_that_was_read_in_part_or_changed_is_what_is_left_of_it(tmp_path:
 
 def test_options_are_for_text_too_and_questions_take_it():
     found = load(URDF["urdf+"], platform="bar", motors="a")
-    assert (found.platform, [joint.name for joint in found.joints.values() if joint.actuated]) == ("bar", ["a"])
+    assert (found.platform, [joint.name for joint in found.joints.values() if joint.is_actuated]) == ("bar", ["a"])
     assert hrsynth.check(URDF["urdf+"]).setup.robot.name == "four_bar"
 
 

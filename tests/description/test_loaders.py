@@ -10,7 +10,7 @@ import pytest
 
 from description.samples import every_joint, with_rods
 from hrsynth.analysis.derive import derive
-from hrsynth.description import list_robots, load, native, spanning
+from hrsynth.description import build_spanning_mechanism, list_robots, load, native
 from hrsynth.errors import BadRequest
 from hrsynth.mechanism.model import JointType, Mechanism
 
@@ -32,7 +32,7 @@ ROBOTS |= {name: load(path) for name, path in list_robots().items()}
 @pytest.fixture(params=ROBOTS.values(), ids=ROBOTS)
 def robot(request: pytest.FixtureRequest) -> Mechanism:
     """A mechanism as it is written."""
-    return spanning(request.param)
+    return build_spanning_mechanism(request.param)
 
 
 def test_pinocchio_loads_the_tree(robot: Mechanism):

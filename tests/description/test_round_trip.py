@@ -11,15 +11,15 @@ from hypothesis import strategies as st
 
 import strategies as some
 from description.samples import FOUR_BAR, every_joint, moved, rotation, with_rods
-from hrsynth.description import native, numerals, spanning, xml
+from hrsynth.description import build_spanning_mechanism, native, numerals, xml
 from hrsynth.description.jointgraph import LOOP_TYPES, FrameSpec, JointSpec
-from hrsynth.description.jointmotion import residual
+from hrsynth.description.jointmotion import compute_closure_residual
 from hrsynth.errors import BadRequest
-from hrsynth.geometry.vectors import pose, rotation_from_rpy
+from hrsynth.geometry.vectors import build_pose, convert_rpy_to_rotation
 from hrsynth.mechanism.model import Coupling, Joint, JointType, Limits, Link, Mechanism, Motor
 from hrsynth.mechanism.observation import Observation
 from hrsynth.mechanism.observations.direction import Direction
-from hrsynth.tolerances import ASSEMBLED
+from hrsynth.tolerances import ZERO_ASSEMBLY_TOL
 
 IN_TREE = list(JointType)
 IN_LOOP = [kind for kind in JointType if kind is not JointType.FREE]
@@ -30,7 +30,7 @@ def check_round_trip(mechanism: Mechanism) -> Mechanism:
     """The law of this file; the mechanism as read."""
     text = native.write(mechanism)
     read = native.parse(text)
-    assert read.differences(spanning(mechanism)) == []
+    assert read.differences(build_spanning_mechanism(mechanism)) == []
     assert native.write(read) == text
     return read
 
@@ -84,14 +84,14 @@ def test_robots_in_any_position_cut_anywhere(mechanism: Mechanism, seed: int, ch
 def test_the_base_frame_is_where_the_base_link_is(seed: int):
     rng = np.random.default_rng(seed)
     robot = with_rods()
-    seen = moved(robot, pose(rng.normal(size=3), rotation(rng)))
-    assert native.parse(native.write(seen)).differences(spanning(robot)) == []
+    seen = moved(robot, build_pose(rng.normal(size=3), rotation(rng)))
+    assert native.parse(native.write(seen)).differences(build_spanning_mechanism(robot)) == []
 
 
 @settings(deadline=None, max_examples=60)
 @given(some.parallel_robots())
 def test_a_written_file_is_assembled_at_zero(mechanism: Mechanism):
-    root = xml.document(native.write(mechanism), "f")
+    root = xml.parse_document(native.write(mechanism), "f")
     poses = {mechanism.base: np.eye(4)}
     joints = root.findall("joint")
     while joints:
@@ -114,9 +114,9 @@ def test_a_written_file_is_assembled_at_zero(mechanism: Mechanism):
         ]
         kind = LOOP_TYPES[loop.get("type")]
         spec = JointSpec(loop.get("name"), kind, (FrameSpec("a"), FrameSpec("b")), tuple(axes))
-        assert residual(spec, ends[0], ends[1], mechanism.length) <= ASSEMBLED
+        assert compute_closure_residual(spec, ends[0], ends[1], mechanism.length) <= ZERO_ASSEMBLY_TOL
         if kind is JointType.UNIVERSAL:
-            assert abs((ends[0][:3, :3] @ axes[0]) @ (ends[1][:3, :3] @ axes[1])) <= ASSEMBLED
+            assert abs((ends[0][:3, :3] @ axes[0]) @ (ends[1][:3, :3] @ axes[1])) <= ZERO_ASSEMBLY_TOL
     assert loops
 
 
@@ -125,24 +125,24 @@ def _pose(origin):
         [float(word) for word in (origin.get(key, "0 0 0") if origin is not None else "0 0 0").split()]
         for key in ("xyz", "rpy")
     ]
-    return pose(numbers[0], rotation_from_rpy(*numbers[1]))
+    return build_pose(numbers[0], convert_rpy_to_rotation(*numbers[1]))
 
 
 @settings(max_examples=300)
 @given(SEEDS)
 def test_written_angles_give_the_rotation(seed: int):
     R = rotation(np.random.default_rng(seed))
-    assert np.max(np.abs(rotation_from_rpy(*numerals.rpy(R)) - R)) < 5e-13
+    assert np.max(np.abs(convert_rpy_to_rotation(*numerals.compute_rounded_rpy(R)) - R)) < 5e-13
 
 
 @settings(max_examples=300)
 @given(SEEDS)
 def test_a_written_axis_is_a_unit_vector_and_a_fixed_point(seed: int):
     direction = np.random.default_rng(seed).normal(size=3)
-    text = numerals.axis(direction)
+    text = numerals.format_axis(direction)
     read = numerals.parse(text, 3)
     assert abs(np.linalg.norm(read) - 1) < 2e-15
-    assert numerals.axis(read) == text
+    assert numerals.format_axis(read) == text
     assert np.linalg.norm(np.cross(read, direction)) < 1e-12 * np.linalg.norm(direction)
 
 
@@ -160,7 +160,7 @@ def test_a_written_axis_is_a_unit_vector_and_a_fixed_point(seed: int):
     ],
 )
 def test_numbers_are_short(value: float, text: str):
-    assert numerals.decimal(value, 13) == text
+    assert numerals.format_decimal(value, 13) == text
 
 
 def test_the_file_of_the_contract_reads_as_it_says():
@@ -172,27 +172,27 @@ def test_the_file_of_the_contract_reads_as_it_says():
     assert robot.joints["a"].motor.name == "m"
     assert np.allclose(robot.joints["d"].point, (2, 0, 1))
     assert np.allclose(robot.joints["d"].axis, (0, 1, 0))
-    assert np.allclose(robot.links["bar"].pose, pose((0, 0, 1)))
+    assert np.allclose(robot.links["bar"].pose, build_pose((0, 0, 1)))
     assert (robot.links["crank"].line, robot.joints["d"].line, robot.observations[0].line) == (3, 25, 39)
     check_round_trip(robot)
 
 
 def test_the_spanning_tree_stays_where_it_is_one():
     robot = with_rods()
-    assert spanning(robot).differences(robot) == []
-    assert list(spanning(robot).joints) == list(robot.joints)
+    assert build_spanning_mechanism(robot).differences(robot) == []
+    assert list(build_spanning_mechanism(robot).joints) == list(robot.joints)
 
 
 def test_a_new_spanning_tree_prefers_single_freedoms_and_leaves_balls_as_loops():
     robot = with_rods()
     turned = {name: replace(joint.turned(), in_tree=False) for name, joint in robot.joints.items()}
     loose = replace(robot, joints=turned)
-    tree = spanning(loose)
+    tree = build_spanning_mechanism(loose)
     assert all(tree.joints[f"shoulder_{leg}"].in_tree for leg in range(3))
     assert sum(joint.in_tree for joint in tree.joints.values()) == len(tree.links) - 1
     assert next(iter(tree.links)) == "base"
     assert [joint.in_tree for joint in tree.joints.values()] == [True] * 10 + [False] * 5
-    assert list(spanning(tree).joints) == list(tree.joints)
+    assert list(build_spanning_mechanism(tree).joints) == list(tree.joints)
     check_round_trip(loose)
 
 
@@ -206,7 +206,7 @@ def test_two_revolutes_that_one_motor_drives_stay_two():
     lines = native.write(driven).splitlines()
     start = next(number for number, line in enumerate(lines) if '<transmission name="m__2">' in line)
     one = native.parse("\n".join(lines[:start] + lines[start + 7 :]))
-    assert {name: joint.actuated for name, joint in one.joints.items() if joint.in_tree and joint.type.freedoms} == {
+    assert {name: joint.is_actuated for name, joint in one.joints.items() if joint.in_tree and joint.type.freedoms} == {
         "tree_0__1": True,
         "tree_0__2": False,
     }
@@ -399,8 +399,8 @@ def test_a_mechanism_without_loops_says_so():
         replace(SERIAL, observations=(Elsewhere("1", "end"),)),
         replace(SERIAL, name="a\0b"),
         SERIAL.changed(links=[Link("lost")]),
-        SERIAL.changed(links=[Link("end", pose((np.nan, 0, 0)))]),
-        SERIAL.changed(links=[Link("end", pose((1e10, 0, 0)))]),
+        SERIAL.changed(links=[Link("end", build_pose((np.nan, 0, 0)))]),
+        SERIAL.changed(links=[Link("end", build_pose((1e10, 0, 0)))]),
         SERIAL.changed(links=[Link("end", xml=("<broken",))]),
         SERIAL.changed(joints=[Joint(name, JointType.FREE, "base", "end", np.zeros(3)) for name in "fg"]),
         SERIAL.changed(

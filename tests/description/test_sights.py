@@ -14,15 +14,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.cli import execute
-from hrsynth.description import load, native, save, spanning
-from hrsynth.description.observation_text import parse_camera, parse_see, with_sights
+from hrsynth.cli import run_command
+from hrsynth.description import build_spanning_mechanism, load, native, save
+from hrsynth.description.observation_text import add_observations, parse_camera, parse_see
 from hrsynth.errors import BadRequest, BadRobotFile
-from hrsynth.geometry.vectors import pose
+from hrsynth.geometry.vectors import build_pose
 from hrsynth.mechanism.cameras import CameraObservation, NamedCamera
 from hrsynth.mechanism.model import Mechanism
-from hrsynth.mechanism.normal import normal_form
-from hrsynth.mechanism.observations import kinds
+from hrsynth.mechanism.normal import reduce_to_normal_form
+from hrsynth.mechanism.observations import list_kinds
 from hrsynth.mechanism.observations.encoder import Encoder
 from strategies import random_direction, random_rotation
 
@@ -43,12 +43,12 @@ def seeing_all(robot: str, rng: np.random.Generator) -> Mechanism:
     mechanism = load(robot)
     links = [link for link in mechanism.links if link != mechanism.base]
     cameras = [
-        NamedCamera("eye", mechanism.base, pose(rng.normal(size=3), random_rotation(rng)), 812.5, 640),
-        NamedCamera("the hand", mechanism.platform, pose(rng.normal(size=3), random_rotation(rng))),
+        NamedCamera("eye", mechanism.base, build_pose(rng.normal(size=3), random_rotation(rng)), 812.5, 640),
+        NamedCamera("the hand", mechanism.platform, build_pose(rng.normal(size=3), random_rotation(rng))),
     ]
     joint = next(joint.name for joint in mechanism.joints.values() if joint.type in ("R", "P"))
     specs = []
-    for word, kind in kinds().items():
+    for word, kind in list_kinds().items():
         if kind is Encoder:
             specs.append(parse_see(f"encoder:{joint}", ["eye"]))
             continue
@@ -58,7 +58,7 @@ def seeing_all(robot: str, rng: np.random.Generator) -> Mechanism:
                 text += ("@" if name == "at" else "/") + ",".join(map(repr, vector.tolist()))
         specs.append(parse_see(text + f"/{'-' * (word == 'edge')}0.02" * ("radius" in kind.needs), []))
     seen = replace(specs[0], camera="the hand", link=mechanism.base, leg="seen by the hand")
-    return with_sights(mechanism, [*specs, seen], cameras)
+    return add_observations(mechanism, [*specs, seen], cameras)
 
 
 @pytest.mark.parametrize("robot", ["gough_stewart", "delta", "3rrr_m1"])
@@ -68,7 +68,7 @@ def test_every_kind_is_written_and_read_again(robot: str, rng: np.random.Generat
     mechanism = seeing_all(robot, rng)
     text = native.write(mechanism)
     read = native.parse(text)
-    assert read.differences(spanning(mechanism)) == []
+    assert read.differences(build_spanning_mechanism(mechanism)) == []
     assert len(read.observations) == len(load(robot).observations) + 14
     assert native.write(read) == text
 
@@ -95,7 +95,7 @@ def test_every_kind_survives_in_other_dialects(robot: str, ending: str, tmp_path
 
 def test_the_normal_form_sees_the_same() -> None:
     mechanism = seeing_all("delta", np.random.default_rng(3))
-    normal = normal_form(mechanism).mechanism
+    normal = reduce_to_normal_form(mechanism).mechanism
     for mine, theirs in zip(mechanism.observations, normal.observations, strict=True):
         values = [
             o.value(robot.links[o.seen_from or robot.reference].pose, robot.links[o.link].pose)
@@ -200,7 +200,7 @@ ASKED_WRONG = [
 def test_what_is_wrong_on_the_command_line_is_one_line(
     words: list[str], said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert execute(["legs", "gough_stewart", *words]) == 2
+    assert run_command(["legs", "gough_stewart", *words]) == 2
     told = capsys.readouterr().err
     assert told.startswith("hrsynth: ")
     assert told.count("\n") == 1
@@ -211,9 +211,9 @@ def test_what_is_wrong_on_the_command_line_is_one_line(
 def test_commands_that_know_segments_only_say_so(
     command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    save(with_sights(load("delta"), [parse_see("point:platform@0,0,0.1", [])]), tmp_path / "delta.urdf")
+    save(add_observations(load("delta"), [parse_see("point:platform@0,0,0.1", [])]), tmp_path / "delta.urdf")
     words = ["--start", "x=0", "--goal", "x=0.01", "--dynamics"]
-    assert execute([command, str(tmp_path / "delta.urdf"), *words]) == 2
+    assert run_command([command, str(tmp_path / "delta.urdf"), *words]) == 2
     assert "knows directions of segments only" in capsys.readouterr().err
 
 
@@ -231,9 +231,9 @@ def test_commands_that_know_segments_only_say_so(
 def test_commands_read_what_a_file_observes(words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     sights = [parse_see(text, ["eye"]) for text in ("point:platform@0,0,0.1", "distance:platform@0,0,0.1")]
     below = parse_camera("eye=base@0,0,0/180deg,0,0")
-    save(with_sights(load("delta"), sights, [below]), tmp_path / "delta.urdf")
+    save(add_observations(load("delta"), sights, [below]), tmp_path / "delta.urdf")
     command, *more = words.split()
-    assert execute([command, str(tmp_path / "delta.urdf"), *more, "--json"]) == 0
+    assert run_command([command, str(tmp_path / "delta.urdf"), *more, "--json"]) == 0
     assert '"kind": "point"' in (told := capsys.readouterr().out) or command == "select"
     assert "distance_1" in told
 
@@ -245,7 +245,7 @@ def test_the_command_line_and_python_see_the_same(capsys: pytest.CaptureFixture[
         word for name, texts in (("--sensor", sensor), ("--camera", cameras)) for text in texts for word in (name, text)
     ]
     sensor[0] = words[1] = "eye=" + sensor[0]
-    assert execute(["check", "gough_stewart", "--observe", "1", *words, "--json"]) == 0
+    assert run_command(["check", "gough_stewart", "--observe", "1", *words, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)["observed"]
     setup = ObservedRobot.of("gough_stewart", "1", cameras, sensor=sensor)
     assert told == [o.to_dict() for o in setup.observed]
@@ -315,10 +315,15 @@ def test_every_element_is_documented() -> None:
         "`leg`",
     ]
     assert [word for word in words if word not in text.replace("at=", "`at`")] == []
-    assert {name.rstrip("?") for kind in kinds().values() for name in kind.needs} == {"at", "axis", "radius", "joint"}
+    assert {name.rstrip("?") for kind in list_kinds().values() for name in kind.needs} == {
+        "at",
+        "axis",
+        "radius",
+        "joint",
+    }
 
 
 def test_the_help_names_every_kind(capsys: pytest.CaptureFixture[str]) -> None:
-    assert execute(["derive", "--help"]) == 0
+    assert run_command(["derive", "--help"]) == 0
     told = " ".join(capsys.readouterr().out.split())
-    assert [kind for kind in kinds() if kind not in told[told.index("--sensor") :]] == []
+    assert [kind for kind in list_kinds() if kind not in told[told.index("--sensor") :]] == []

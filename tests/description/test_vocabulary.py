@@ -14,9 +14,9 @@ from lxml import etree
 from description.foreign.examples import FILES
 from description.foreign.test_models import MODELS
 from description.foreign.test_package_robots import FILES as PACKAGED
-from hrsynth.cli import execute
+from hrsynth.cli import run_command
 from hrsynth.description import formats, list_robots, load, save, xml
-from hrsynth.description.vocabulary import Vocabulary, misspelt
+from hrsynth.description.vocabulary import Vocabulary, find_misspelt
 from hrsynth.errors import BadRequest, BadRobotFile, HrsynthError
 
 ROOTS = {"robot": "urdf", "mujoco": "mjcf", "sdf": "sdf", "gazebo": "sdf"}
@@ -25,12 +25,12 @@ LETTERS = "abcdefghijklmnopqrstuvwxyz_-012XYZ"
 
 
 def vocabulary(root: etree._Element) -> Vocabulary:
-    return formats.vocabulary(ROOTS[str(root.tag)])
+    return formats.get_vocabulary(ROOTS[str(root.tag)])
 
 
 def document(file: Path) -> etree._Element | None:
     try:
-        root = xml.document(file.read_bytes(), str(file), [])
+        root = xml.parse_document(file.read_bytes(), str(file), [])
     except HrsynthError:
         return None
     return root if str(root.tag) in ROOTS else None
@@ -51,7 +51,7 @@ def test_every_name_of_a_real_file_is_known(file: Path):
 
 @pytest.mark.parametrize("name", [name for name, text in FILES.items() if isinstance(text, str)])
 def test_every_name_of_the_examples_of_all_formats_is_known(name: str):
-    root = xml.document(FILES[name], name, [])
+    root = xml.parse_document(FILES[name], name, [])
     assert [(each.place, each.name) for each in vocabulary(root).unknown(root)] == []
 
 
@@ -68,7 +68,7 @@ def test_every_name_that_is_written_is_known(name: str, ending: str, tmp_path: P
 def test_every_name_of_mujocos_schema_is_known():
     """Elements that are read have all attributes and children that MuJoCo's own schema gives them."""
     mujoco = pytest.importorskip("mujoco")
-    known = formats.vocabulary("mjcf")
+    known = formats.get_vocabulary("mjcf")
     rows, path, names = known.elements, list[str](), frozenset[str]()
     missing, seen, read = set[tuple[str, str]](), set[str](), False
     for line in mujoco.mj_printSchema(False, False).splitlines():
@@ -163,7 +163,7 @@ def test_a_mistyped_axis_is_refused_with_its_line(tmp_path: Path, capsys: pytest
     text = list_robots()["3rrr_m1"].read_text()
     path = tmp_path / "robot.urdf"
     path.write_text(text.replace('<axis xyz="0 0 1"', '<axis xyx="0 0 1"', 1))
-    assert execute(["check", str(path)]) == 2
+    assert run_command(["check", str(path)]) == 2
     line = text.split("<axis")[0].count("\n") + 1
     assert capsys.readouterr().err == f"hrsynth: {path}:{line}: unknown attribute of <axis>: got xyx, expected xyz\n"
 
@@ -173,7 +173,7 @@ def test_a_mistyped_key_beside_a_urdf_is_refused_with_its_line(wrong: str, tmp_p
     save(load("quattro"), tmp_path / "robot.yaml")
     path = tmp_path / "robot.yaml"
     text = path.read_text()
-    (key,) = (key for key in ("closed_loop", "name_mot", "joint_name") if misspelt(wrong, [key]))
+    (key,) = (key for key in ("closed_loop", "name_mot", "joint_name") if find_misspelt(wrong, [key]))
     text = text if f"{key}:" in text else f"{text}{key}: []\n"
     path.write_text(text.replace(f"{key}:", f"{wrong}:"))
     line = path.read_text().split(f"{wrong}:")[0].count("\n") + 1
@@ -188,7 +188,7 @@ def test_another_unknown_name_is_said_once_and_names_of_other_programs_are_not(t
     more = '<hydraulics/><hydraulics/><v:pump xmlns:v="urn:v" nmae="a"/><gazebo><sensr nmae="a"/></gazebo>'
     text = text.replace("<axis xyz", '<axis v:xyx="1" xmlns:v="u" xyz')
     path.write_text(text.replace("<hrsynth>", f"{more}<hrsynth>"))
-    assert execute(["legs", str(path)]) == 0
+    assert run_command(["legs", str(path)]) == 0
     (said,) = capsys.readouterr().err.splitlines()
     line = text.split("<hrsynth>")[0].count("\n") + 1
     assert said == f"hrsynth: ignored: unknown element in <robot>: got <hydraulics> (line {line}, and more)"
@@ -213,5 +213,5 @@ def test_another_unknown_name_is_said_once_and_names_of_other_programs_are_not(t
     ],
 )
 def test_one_edit_is_one_edit(one: str, two: str, same: bool):
-    assert (misspelt(one, [two]) == (two,)) is same
-    assert (misspelt(two, [one]) == (one,)) is same
+    assert (find_misspelt(one, [two]) == (two,)) is same
+    assert (find_misspelt(two, [one]) == (one,)) is same

@@ -12,9 +12,16 @@ import pytest
 
 from hrsynth import description
 from hrsynth.errors import BadRequest
-from hrsynth.families import ROBOTS, Shipped, delta, npod, planar
+from hrsynth.families import ROBOTS, ShippedRobot, delta, npod, planar
 from hrsynth.families.__main__ import main
-from hrsynth.families.geometry import Z, on_circle, on_line, polar, radial, tangent
+from hrsynth.families.geometry import (
+    Z,
+    compute_polar_point,
+    compute_radial,
+    compute_tangent,
+    locate_on_circle,
+    locate_on_line,
+)
 from hrsynth.geometry.vectors import Array
 from hrsynth.mechanism.model import JointType, Mechanism
 from oracle import Oracle, split_rank
@@ -100,7 +107,7 @@ def motor_rates(oracle: Oracle, state: Array, velocities: Array) -> Array:
     """The rates of the actuated R and P, without dimensions."""
     rates = []
     for joint in oracle.mechanism.joints.values():
-        if joint.actuated:
+        if joint.is_actuated:
             assert joint.type in (JointType.REVOLUTE, JointType.PRISMATIC)
             (X_a, V_a), (X_b, V_b) = (
                 (oracle.pose(state, link), oracle.twist(velocities, link)) for link in joint.links
@@ -156,7 +163,7 @@ def test_the_table_is_sorted_and_complete():
 
 
 @robots
-def test_a_robot_is_what_the_table_says(robot: Shipped):
+def test_a_robot_is_what_the_table_says(robot: ShippedRobot):
     mechanism = robot.make()
     assert mechanism.name == robot.name
     assert robot.dof == EXPECTED[robot.name].dof
@@ -168,14 +175,14 @@ def test_a_robot_is_what_the_table_says(robot: Shipped):
 
 
 @robots
-def test_the_architecture_counts_joints_and_motors(robot: Shipped):
+def test_the_architecture_counts_joints_and_motors(robot: ShippedRobot):
     count, legs = re.fullmatch(r"(?:(\d)-)?(.*)", robot.architecture).groups()
     legs = re.sub(r"-\{2-(\w+)\}", r"\1\1", legs) * int(count or 1)
     mechanism = robot.make()
     found = "".join(joint.type.value for joint in mechanism.joints.values())
     expected = legs.replace("*", "") + NOT_IN_LEGS.get(robot.name, "")
     assert sorted(found) == sorted(expected)
-    driven = sorted(joint.type.value for joint in mechanism.joints.values() if joint.actuated)
+    driven = sorted(joint.type.value for joint in mechanism.joints.values() if joint.is_actuated)
     assert driven == sorted(re.findall(r"(\w)\*", legs))
 
 
@@ -183,7 +190,7 @@ def test_the_architecture_counts_joints_and_motors(robot: Shipped):
 
 
 @robots
-def test_zero_is_assembled_and_far_from_singularities(robot: Shipped):
+def test_zero_is_assembled_and_far_from_singularities(robot: ShippedRobot):
     oracle = Oracle(robot.make())
     zero, expected = oracle.zero(), EXPECTED[robot.name]
     assert oracle.error(zero) < 1e-12
@@ -199,7 +206,7 @@ def test_zero_is_assembled_and_far_from_singularities(robot: Shipped):
 
 @pytest.mark.some(8)
 @robots
-def test_freedoms_are_finite_motions(robot: Shipped):
+def test_freedoms_are_finite_motions(robot: ShippedRobot):
     oracle = Oracle(robot.make())
     for state in oracle.random_walk(np.random.default_rng(7), 3, 0.2):
         assert oracle.error(state) < 1e-10
@@ -246,8 +253,8 @@ def test_both_quattros_have_the_legs_of_the_papers(make, radius: float):
         assert pytest.approx(radius * np.array([math.cos(angle), math.sin(angle), 0]), abs=1e-15) == A
         assert np.linalg.norm(B - A) == pytest.approx(0.380, abs=1e-14)
         assert np.linalg.norm(C - B) == pytest.approx(0.825, abs=1e-14)
-        assert abs(mechanism.joints[f"shoulder_{leg}"].axis @ radial(angle)) < 1e-15
-        assert (B - A) @ radial(angle) > 0, "knees outwards"
+        assert abs(mechanism.joints[f"shoulder_{leg}"].axis @ compute_radial(angle)) < 1e-15
+        assert (B - A) @ compute_radial(angle) > 0, "knees outwards"
     assert mechanism.links["platform"].pose[:3, 3] == pytest.approx([0, 0, -0.7])
 
 
@@ -277,7 +284,7 @@ def test_the_quattro_has_the_platform_of_mmt():
 
 
 @robots
-def test_pairs_of_rods_are_equal_and_parallel(robot: Shipped):
+def test_pairs_of_rods_are_equal_and_parallel(robot: ShippedRobot):
     mechanism = robot.make()
     pairs = [name[:-1] for name in mechanism.links if re.fullmatch(r"rod_\da", name)]
     assert bool(pairs) == ("{2-SS}" in robot.architecture)
@@ -331,11 +338,11 @@ def test_a_third_motor_is_refused():
 def test_circles_and_lines_meet_spheres():
     target = np.array([0.1, 0.05, -0.6])
     for outward in (True, False):
-        B = on_circle(polar(0.2, 0.0), radial(0.0), Z, 0.25, target, 0.6, outward)
-        assert np.linalg.norm(B - polar(0.2, 0.0)) == pytest.approx(0.25)
+        B = locate_on_circle(compute_polar_point(0.2, 0.0), compute_radial(0.0), Z, 0.25, target, 0.6, outward)
+        assert np.linalg.norm(B - compute_polar_point(0.2, 0.0)) == pytest.approx(0.25)
         assert np.linalg.norm(B - target) == pytest.approx(0.6)
-        assert abs(B @ tangent(0.0)) < 1e-15
-    near, far = (on_line(polar(0.2, 0.0), Z, target, 0.6, forward) for forward in (False, True))
+        assert abs(B @ compute_tangent(0.0)) < 1e-15
+    near, far = (locate_on_line(compute_polar_point(0.2, 0.0), Z, target, 0.6, forward) for forward in (False, True))
     assert np.linalg.norm(near - target) == pytest.approx(0.6)
     assert np.linalg.norm(far - target) == pytest.approx(0.6)
     assert far[2] > near[2]
@@ -349,13 +356,13 @@ def test_the_folder_holds_the_table():
 
 
 @robots
-def test_the_file_is_not_stale(robot: Shipped):
+def test_the_file_is_not_stale(robot: ShippedRobot):
     text = (FOLDER / f"{robot.name}.urdf").read_text(encoding="utf-8")
     assert text == description.native.write(robot.make()), "run: python -m hrsynth.families"
 
 
 @robots
-def test_the_file_reads_back(robot: Shipped):
+def test_the_file_reads_back(robot: ShippedRobot):
     assert description.load(FOLDER / f"{robot.name}.urdf").differences(robot.make()) == []
 
 

@@ -11,7 +11,7 @@ import hrsynth
 from hrsynth.errors import BadRequest
 from hrsynth.families.__main__ import main
 from hrsynth.families.linkages import LINKAGES, Linkage
-from hrsynth.geometry.vectors import Array, perpendicular, rotation_about, unit
+from hrsynth.geometry.vectors import Array, find_perpendicular, normalise_vector, rotate_about_axis
 from hrsynth.mechanism.builder import Builder
 
 
@@ -29,7 +29,7 @@ def drawn(name: str, seed: int) -> tuple[Linkage, Array, Array]:
         "schatz": (1.0, 0.2 + abs(offsets[0])),
     }
     linkage = LINKAGES[name](*dimensions[name])
-    return linkage, linkage.regular(rng), rotation_about(rng.normal(size=3), rng.uniform(0, 3))
+    return linkage, linkage.regular(rng), rotate_about_axis(rng.normal(size=3), rng.uniform(0, 3))
 
 
 def closings(linkage: Linkage, seed: int, starts: int, second: float) -> list[Array]:
@@ -176,13 +176,15 @@ def test_a_loop_that_closes_at_any_joint_is_answered(word: str, closing: str):
     """With joints that are no R and P, or more of them than are bounded, its modes are found."""
     rng, b = np.random.default_rng(len(word)), Builder("loop")
     places, links = rng.normal(size=(len(word) + 1, 3)), ["base", *(f"link_{k}" for k in range(1, len(word) + 1))]
-    axes = [unit(each) for each in rng.normal(size=(len(word) + 1, 3))]
+    axes = [normalise_vector(each) for each in rng.normal(size=(len(word) + 1, 3))]
     b.link("base")
     for link, at in zip(links[1:], places, strict=False):
         b.link(link, at=at)
 
     def turns(k: int, kind: str) -> dict[str, Array]:
-        return {} if kind == "S" else {"axis": axes[k]} | ({"axis2": perpendicular(axes[k])} if kind == "U" else {})
+        return (
+            {} if kind == "S" else {"axis": axes[k]} | ({"axis2": find_perpendicular(axes[k])} if kind == "U" else {})
+        )
 
     for k, kind in enumerate(word):
         b.joint(f"joint_{k}", kind, links[k], links[k + 1], at=places[k], motor=k == 0, **turns(k, kind))

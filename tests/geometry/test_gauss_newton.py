@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from hrsynth.geometry.gauss_newton import Damping, Residual, descend
+from hrsynth.geometry.gauss_newton import DampingFactor, Residual, descend
 from hrsynth.geometry.vectors import Array
 
-DAMPING = Damping(start=1.0, eased=0.1, least=1e-9, most=1e8)
+DAMPING = DampingFactor(start=1.0, eased=0.1, least=1e-9, most=1e8)
 
 
 def circles(x: Array) -> tuple[Array, Array]:

@@ -9,17 +9,17 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from hrsynth.geometry.so3 import (
-    angle_of,
-    between,
-    exponential,
-    logarithm,
-    logarithm_rate,
-    quaternions,
+    compute_rotation_angle,
+    compute_rotation_vector_rate,
+    convert_rotations_to_vectors,
+    convert_to_quaternions,
+    convert_vectors_to_rotations,
+    find_smallest_rotations,
     turn_about,
     wrap_angle,
 )
-from hrsynth.geometry.vectors import Array, hat, rotation_from_rpy
-from hrsynth.mechanism.pose import Pose, rpy_of
+from hrsynth.geometry.vectors import Array, convert_rpy_to_rotation, hat
+from hrsynth.mechanism.pose import Pose, compute_rpy
 
 NEAR = 1e-12
 parts = st.floats(-1, 1, allow_subnormal=False)
@@ -38,58 +38,60 @@ angles = (
 @given(axes, angles)
 @settings(max_examples=300)
 def test_the_logarithm_is_the_inverse_of_the_exponential(axis: Array, angle: float) -> None:
-    R = exponential(angle * axis)
-    vector = logarithm(R)
-    assert np.abs(exponential(vector) - R).max() < NEAR
+    R = convert_vectors_to_rotations(angle * axis)
+    vector = convert_rotations_to_vectors(R)
+    assert np.abs(convert_vectors_to_rotations(vector) - R).max() < NEAR
     assert np.linalg.norm(vector) == pytest.approx(angle, abs=NEAR)
-    assert angle_of(R) == pytest.approx(angle, abs=NEAR)
+    assert compute_rotation_angle(R) == pytest.approx(angle, abs=NEAR)
     apart = [float(np.abs(vector - sign * angle * axis).max()) for sign in (1, -1)]
     assert min(apart[:1] if angle < np.pi - NEAR else apart) < NEAR
-    assert logarithm(R[None])[0] == pytest.approx(vector, abs=NEAR) or angle > np.pi - NEAR
-    assert np.abs(exponential(logarithm(R[None]))[0] - R).max() < NEAR
+    assert convert_rotations_to_vectors(R[None])[0] == pytest.approx(vector, abs=NEAR) or angle > np.pi - NEAR
+    assert np.abs(convert_vectors_to_rotations(convert_rotations_to_vectors(R[None]))[0] - R).max() < NEAR
 
 
 @given(axes, angles)
 def test_the_exponential_is_that_of_matrices(axis: Array, angle: float) -> None:
-    assert np.abs(exponential(angle * axis) - expm(angle * hat(axis))).max() < NEAR
+    assert np.abs(convert_vectors_to_rotations(angle * axis) - expm(angle * hat(axis))).max() < NEAR
 
 
 @pytest.mark.parametrize("axis", [*np.eye(3), *-np.eye(3)])
 def test_half_a_turn_about_a_coordinate_axis_is_exact(axis: Array) -> None:
     R = np.diag(2 * axis**2 - 1)
-    assert np.abs(np.abs(logarithm(R)) - np.pi * np.abs(axis)).max() == 0
-    assert np.abs(np.abs(logarithm(R[None])) - np.pi * np.abs(axis)).max() == 0
+    assert np.abs(np.abs(convert_rotations_to_vectors(R)) - np.pi * np.abs(axis)).max() == 0
+    assert np.abs(np.abs(convert_rotations_to_vectors(R[None])) - np.pi * np.abs(axis)).max() == 0
 
 
 def test_many_at_once_are_as_one_by_one() -> None:
     vectors = np.random.default_rng(0).normal(size=(4, 5, 3))
-    R = exponential(vectors)
+    R = convert_vectors_to_rotations(vectors)
     for place in np.ndindex(4, 5):
-        assert R[place] == pytest.approx(exponential(vectors[place]), abs=1e-15)
-        assert logarithm(R)[place] == pytest.approx(logarithm(R[place]), abs=1e-14)
+        assert R[place] == pytest.approx(convert_vectors_to_rotations(vectors[place]), abs=1e-15)
+        assert convert_rotations_to_vectors(R)[place] == pytest.approx(
+            convert_rotations_to_vectors(R[place]), abs=1e-14
+        )
         assert hat(vectors)[place] == pytest.approx(hat(vectors[place]))
 
 
 @given(axes, angles)
 def test_a_quaternion_turns_as_its_rotation(axis: Array, angle: float) -> None:
-    R = exponential(angle * axis)
-    w, *v = quaternions(R[None])[0]
+    R = convert_vectors_to_rotations(angle * axis)
+    w, *v = convert_to_quaternions(R[None])[0]
     assert w >= 0
     assert pytest.approx(np.eye(3) + 2 * w * hat(v) + 2 * hat(v) @ hat(v), abs=NEAR) == R
 
 
 @given(axes, st.floats(0.01, 3.1), axes)
 def test_the_rate_of_the_logarithm(axis: Array, angle: float, omega: Array) -> None:
-    R, h = exponential(angle * axis), 1e-6
-    ahead, behind = (logarithm(exponential(step * omega) @ R) for step in (h, -h))
-    assert logarithm_rate(angle * axis) @ omega == pytest.approx((ahead - behind) / (2 * h), abs=1e-6)
+    R, h = convert_vectors_to_rotations(angle * axis), 1e-6
+    ahead, behind = (convert_rotations_to_vectors(convert_vectors_to_rotations(step * omega) @ R) for step in (h, -h))
+    assert compute_rotation_vector_rate(angle * axis) @ omega == pytest.approx((ahead - behind) / (2 * h), abs=1e-6)
 
 
 @given(axes)
 def test_the_rate_at_half_a_turn_and_at_none(axis: Array) -> None:
     near = (np.pi - 1e-9) * axis
-    assert logarithm_rate(np.pi * axis) == pytest.approx(logarithm_rate(near), abs=1e-8)
-    assert logarithm_rate(1e-9 * axis) == pytest.approx(np.eye(3), abs=1e-8)
+    assert compute_rotation_vector_rate(np.pi * axis) == pytest.approx(compute_rotation_vector_rate(near), abs=1e-8)
+    assert compute_rotation_vector_rate(1e-9 * axis) == pytest.approx(np.eye(3), abs=1e-8)
 
 
 @example(np.array([0.0, -1.0, 0.0]), np.array([0.0, 1.0, 5.58119574e-159]))
@@ -99,15 +101,15 @@ def test_the_rate_at_half_a_turn_and_at_none(axis: Array) -> None:
 @given(axes, axes)
 def test_the_smallest_turn_between_two_directions(a: Array, b: Array) -> None:
     for other in (b, -a, a):
-        vector = between(a, other)
-        assert exponential(vector) @ a == pytest.approx(other, abs=1e-9)
+        vector = find_smallest_rotations(a, other)
+        assert convert_vectors_to_rotations(vector) @ a == pytest.approx(other, abs=1e-9)
         assert np.linalg.norm(vector) == pytest.approx(np.arctan2(np.linalg.norm(np.cross(a, other)), a @ other))
         assert abs(vector @ a) < 1e-9
 
 
 @given(axes, st.floats(-np.pi, np.pi))
 def test_the_turn_about_an_axis_is_found_whole(axis: Array, angle: float) -> None:
-    found = turn_about(axis, exponential(angle * axis))[0]
+    found = turn_about(axis, convert_vectors_to_rotations(angle * axis))[0]
     assert abs(wrap_angle(found - angle)) < NEAR
 
 
@@ -117,12 +119,12 @@ def test_a_swing_of_half_a_turn_has_no_twist() -> None:
 
 @given(axes, angles | st.just(np.pi))
 def test_a_printed_rotation_can_be_typed_back(axis: Array, angle: float) -> None:
-    R = exponential(angle * axis)
-    assert rotation_from_rpy(*rpy_of(R)) == pytest.approx(R, abs=2 * NEAR)
-    assert angle_of(Pose.parse(str(Pose(rpy=rpy_of(R)))).rotation @ R.T) < 2e-6
+    R = convert_vectors_to_rotations(angle * axis)
+    assert convert_rpy_to_rotation(*compute_rpy(R)) == pytest.approx(R, abs=2 * NEAR)
+    assert compute_rotation_angle(Pose.parse(str(Pose(rpy=compute_rpy(R)))).rotation @ R.T) < 2e-6
 
 
 @given(st.floats(-4, 4), st.sampled_from([np.pi / 2, -np.pi / 2]), st.floats(-4, 4), st.just(0.0) | sizes)
 def test_a_rotation_next_to_a_right_pitch_can_be_typed_back(roll: float, pitch: float, yaw: float, off: float) -> None:
-    R = rotation_from_rpy(roll, pitch + off, yaw)
-    assert rotation_from_rpy(*rpy_of(R)) == pytest.approx(R, abs=2 * NEAR)
+    R = convert_rpy_to_rotation(roll, pitch + off, yaw)
+    assert convert_rpy_to_rotation(*compute_rpy(R)) == pytest.approx(R, abs=2 * NEAR)

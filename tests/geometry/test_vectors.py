@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hrsynth.geometry.so3 import exponential, quaternions, rotation_of
-from hrsynth.geometry.vectors import angle_between, cross, dot, hat, steady_order, triple
+from hrsynth.geometry.so3 import convert_from_quaternion, convert_to_quaternions, convert_vectors_to_rotations
+from hrsynth.geometry.vectors import cross, dot, hat, measure_angle, sort_rows, triple
 
 SHAPES = [((3,), (3,)), ((5, 3), (3,)), ((4, 1, 3), (5, 3))]
 
@@ -48,8 +48,8 @@ def test_quaternions_and_rotations_are_inverse() -> None:
     rng = np.random.default_rng(3)
     q = rng.normal(size=(50, 4))
     q /= np.linalg.norm(q, axis=1)[:, None] * np.where(q[:, :1] < 0, -1.0, 1.0)
-    R = np.array([rotation_of(each) for each in q])
-    assert quaternions(R) == pytest.approx(q, abs=1e-14)
+    R = np.array([convert_from_quaternion(each) for each in q])
+    assert convert_to_quaternions(R) == pytest.approx(q, abs=1e-14)
     assert R @ R.swapaxes(1, 2) == pytest.approx(np.broadcast_to(np.eye(3), R.shape), abs=1e-14)
 
 
@@ -58,8 +58,8 @@ def test_the_angle_between_a_vector_and_its_turn(angle: float) -> None:
     rng = np.random.default_rng(4)
     v = rng.normal(size=3)
     normal = np.cross(v, rng.normal(size=3))
-    turned = exponential(angle * normal / np.linalg.norm(normal)) @ v
-    assert angle_between(v, turned) == pytest.approx(angle, abs=1e-14)
+    turned = convert_vectors_to_rotations(angle * normal / np.linalg.norm(normal)) @ v
+    assert measure_angle(v, turned) == pytest.approx(angle, abs=1e-14)
 
 
 @given(st.lists(st.tuples(*3 * [st.integers(-2, 2)]), min_size=1, max_size=12, unique=True), st.randoms())
@@ -69,4 +69,4 @@ def test_an_order_is_that_of_the_rows_whatever_their_last_digits_and_places(rows
     near = [
         [value * (1 + 1e-9 * random.uniform(-1, 1)) + 1e-12 * random.uniform(-1, 1) for value in row] for row in rows
     ]
-    assert [rows[i] for i in steady_order(np.array(near), 1e-6)] == sorted(rows)
+    assert [rows[i] for i in sort_rows(np.array(near), 1e-6)] == sorted(rows)

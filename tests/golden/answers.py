@@ -18,9 +18,9 @@ from PIL import Image
 
 import hrsynth
 from hrsynth.analysis.pose_requests import observe
-from hrsynth.catalog.entry import entry
+from hrsynth.catalog.entry import build_entry
 from hrsynth.catalog.query import load as catalog
-from hrsynth.cli import execute
+from hrsynth.cli import run_command
 from hrsynth.description import list_robots
 from hrsynth.errors import HrsynthError
 
@@ -166,7 +166,7 @@ def run(argv: Sequence[str]) -> tuple[int, str, str]:
     """The exit status of a command and what it prints."""
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        status = execute([*argv])
+        status = run_command([*argv])
     return status, out.getvalue(), err.getvalue()
 
 
@@ -193,7 +193,7 @@ def answer(case: Case) -> Json:
     """What is kept of a case."""
     hrsynth.clear_cache()
     if case.kind == "entry":
-        return {"record": entry(case.name)}
+        return {"record": build_entry(case.name)}
     with tempfile.TemporaryDirectory() as folder:
         given = {"folder": folder}
         if any("{home}" in word for word in case.argv):

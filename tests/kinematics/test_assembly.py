@@ -11,7 +11,7 @@ import pytest
 import hrsynth
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import list_robots, load
-from hrsynth.geometry.vectors import pose, unit
+from hrsynth.geometry.vectors import build_pose, normalise_vector
 from hrsynth.kinematics.assembly import Assembler
 from hrsynth.kinematics.configuration import ClosedConfiguration, measure
 from hrsynth.kinematics.limits import SINGLE, CoordinateIntervals
@@ -63,7 +63,7 @@ def test_a_reachable_pose_is_assembled_with_its_directions(name: str):
 @pytest.mark.parametrize("name", ["3rrr_m1", "delta", "quattro", "rrrrr_m1", "orthoglide"])
 def test_a_pose_far_away_names_the_legs_that_do_not_close(name: str):
     setup = prepared(name)
-    far = {body: pose((50.0, 0.0, 0.0)) @ X for body, X in bodies(setup, setup.all_samples.start).items()}
+    far = {body: build_pose((50.0, 0.0, 0.0)) @ X for body, X in bodies(setup, setup.all_samples.start).items()}
     found = assembler(setup).at(far, ())
     assert not found.reachable
     assert found.configuration is None
@@ -120,7 +120,7 @@ def knuckles() -> tuple[Mechanism, np.ndarray, np.ndarray]:
     for i, foot in enumerate(feet):
         tip = 0.5 * feet[(i + 1) % 6 if i % 2 else i - 1] + [0, 0, 1.0]
         first = np.cross(tip - foot, [0.3, 0.1, 1.0])
-        drawn.append([unit(first), unit(tip - foot)])
+        drawn.append([normalise_vector(first), normalise_vector(tip - foot)])
         b.joint(f"a_{i}", "R", "base", f"knuckle_{i}", at=foot, axis=first)
         b.joint(f"b_{i}", "R", f"knuckle_{i}", f"barrel_{i}", at=foot, axis=np.cross(first, tip - foot))
         b.joint(f"p_{i}", "P", f"barrel_{i}", f"rod_{i}", at=(foot + tip) / 2, axis=tip - foot, motor=True)

@@ -14,18 +14,23 @@ from hrsynth.analysis.advice import advise
 from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.derive import derive
 from hrsynth.analysis.observed import ObservedRobot, restrict_samples
-from hrsynth.analysis.verdict import verdict_of
+from hrsynth.analysis.verdict import compute_verdict
 from hrsynth.catalog.architecture_key import parse
-from hrsynth.catalog.geometry import mechanism
+from hrsynth.catalog.geometry import build_mechanism
 from hrsynth.description import load
-from hrsynth.errors import BadMechanism, BranchPoint, InfinitesimalMobility, NotSampled
-from hrsynth.geometry.vectors import Array, rotation_about
-from hrsynth.kinematics.branch_tests import CHANGED, TURNED, alike_after, turned_little
+from hrsynth.errors import BadMechanism, BranchPoint, InfinitesimalMobility, SamplingFailure
+from hrsynth.geometry.vectors import Array, rotate_about_axis
+from hrsynth.kinematics.branch_tests import (
+    SINGULAR_VALUE_RATIO_MAX,
+    TANGENT_ANGLE_MAX_RAD,
+    has_steady_values_after,
+    is_small_principal_angle,
+)
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.kinematics.sampling import _Walks, sample
-from hrsynth.kinematics.velocity_relation import ObservationModel, relation
-from hrsynth.kinematics.walking import random_walk
+from hrsynth.kinematics.velocity_relation import ObservationModel, compute_relation
+from hrsynth.kinematics.walking import walk_randomly
 from hrsynth.mechanism import JointType, Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.pose import Pose
@@ -37,7 +42,7 @@ POD = "(Pk*-Utn-Unt)+(Pz*-2SSt)+(Pz*-Utn-S)+(Rt*-2SSt)"
 def parallelogram(angle: float, normal: tuple[float, float, float] = (0, 0, 1)) -> Mechanism:
     """A four-bar with equal cranks and equal rails, its cranks at ``angle`` from the rails; the coupler translates, but
     where it is flat it can cross over and turns from there on."""
-    turn = rotation_about(np.array([*normal], dtype=float), 0.4)
+    turn = rotate_about_axis(np.array([*normal], dtype=float), 0.4)
     tip = turn @ np.array([np.cos(angle), np.sin(angle), 0.0]) * 0.3
     rail = turn @ np.array([0.5, 0.0, 0.0])
     axis = turn @ np.array([0.0, 0.0, 1.0])
@@ -62,12 +67,14 @@ def test_bounds_never_say_what_singular_values_deny(robot: str) -> None:
         step = rng.normal(size=here.model.nv)
         step *= size / np.linalg.norm(step)
         values = np.linalg.svd(here.model.jacobian(here.model.integrate(here.q, step)), compute_uv=False)[: len(kept)]
-        alike = bool(np.all(values <= CHANGED * kept) and np.all(kept <= CHANGED * values))
-        assert alike_after(here, step) == alike
+        alike = bool(
+            np.all(values <= SINGULAR_VALUE_RATIO_MAX * kept) and np.all(kept <= SINGULAR_VALUE_RATIO_MAX * values)
+        )
+        assert has_steady_values_after(here, step) == alike
         tangent = here.kernel()[0]
         other = np.linalg.qr(tangent + size * rng.normal(size=tangent.shape) / 10)[0]
-        little = bool(np.linalg.norm(other - tangent @ (tangent.T @ other), 2) <= np.sin(TURNED))
-        assert turned_little(tangent, other) == little
+        little = bool(np.linalg.norm(other - tangent @ (tangent.T @ other), 2) <= np.sin(TANGENT_ANGLE_MAX_RAD))
+        assert is_small_principal_angle(tangent, other) == little
         said |= {("alike", alike), ("little", little)}
     assert len(said) == 4
 
@@ -83,7 +90,7 @@ def test_a_parallelogram_does_not_cross_over(angle: float, normal: tuple[float, 
     home = model.pose(model.q0, "coupler")[:3, :3]
     start = ClosedConfiguration.of(model, model.q0)
     drawn = sample(model, observation_model, 10)
-    met = [*(member.configuration for member in drawn.members), *random_walk(start, 300, steps=60)]
+    met = [*(member.configuration for member in drawn.members), *walk_randomly(start, 300, steps=60)]
     assert max(float(np.abs(at.pose("coupler")[:3, :3] - home).max()) for at in met) < 1e-8
     assert max(float(np.linalg.norm(model.difference(start.q, at.q))) for at in met) > 0.1
 
@@ -104,7 +111,7 @@ def test_a_flat_parallelogram_belongs_to_two_modes(angle: float) -> None:
 @pytest.mark.parametrize("robot", ["quattro", "3rrr_m1", "i4l", "orthoglide", "gough_stewart", "halved"])
 def test_walks_in_step_end_where_each_ends_alone(robot: str) -> None:
     """To the last digit, where all steps are whole and where some have to be halved."""
-    halved = mechanism(parse("(Ph*-Pj-Ra-Ra-Ra)+(Ph*-Ra-Rb-Ra-Pj)+(Ra*-Ra-Ph-Ra-Rb)"), 0)
+    halved = build_mechanism(parse("(Ph*-Pj-Ra-Ra-Ra)+(Ph*-Ra-Rb-Ra-Pj)+(Ra*-Ra-Ph-Ra-Rb)"), 0)
     drawn = ObservedRobot.of(halved).all_samples if robot == "halved" else setting_of(robot).all_samples
     together, alone = (_Walks(drawn.observation_model, set(), np.random.default_rng(0), False) for _ in range(2))
     ends = together.walk([drawn.start] * 3), [end for _ in range(3) for end in alone.walk([drawn.start])]
@@ -141,7 +148,7 @@ def test_samples_do_not_rest_on_rounding(robot: str, monkeypatch: pytest.MonkeyP
 @pytest.mark.parametrize("dimensions", [1000, 1002])
 def test_a_sample_with_a_faint_turn_is_of_the_same_mode(dimensions: int) -> None:
     """At some samples of some seeds the platform's third turn has a singular value of 1e-8: no other operation mode."""
-    robot = mechanism(parse("(Ph-Pj-Ra-Rb-Ra)+(Ph!-Ra-Rb-Ra-Pj)"), dimensions)
+    robot = build_mechanism(parse("(Ph-Pj-Ra-Rb-Ra)+(Ph!-Ra-Rb-Ra-Pj)"), dimensions)
     found = [ObservedRobot.of(robot, seed=seed) for seed in range(5)]
     assert {setup.all_samples.signature.motion for setup in found} == {"1T3R"}
 
@@ -151,13 +158,13 @@ def test_a_sample_with_a_faint_turn_is_of_the_same_mode(dimensions: int) -> None
 def test_samples_of_a_pod_stay_in_its_operation_mode(dimensions: int, seed: int) -> None:
     """The rails of legs 2 and 3 are along z, so neither sees the platform, which only translates, move along z. In its
     other operation mode, which lies near, the platform turns and both together see all."""
-    setup = ObservedRobot.of(mechanism(parse(POD), dimensions), seed=seed)
+    setup = ObservedRobot.of(build_mechanism(parse(POD), dimensions), seed=seed)
     segments = setup.segments
     assert [setup.mechanism.joints[f"joint_{leg}_1"].axis.tolist() for leg in (2, 3)] == [[0, 0, 1]] * 2
     for at in setup.configurations:
         R = at.pose("platform")[:3, :3]
         assert np.abs(R - setup.motion.home[:3, :3]).max() < 1e-7
-    verdict = verdict_of(setup, ("2", "3"), restrict_samples(setup.all_samples, segments[1:3]))
+    verdict = compute_verdict(setup, ("2", "3"), restrict_samples(setup.all_samples, segments[1:3]))
     assert (verdict.rank, verdict.dof) == (2, 3)
     assert [freedom.name for freedom in verdict.unobserved] == ["translation along z"]
 
@@ -165,7 +172,7 @@ def test_samples_of_a_pod_stay_in_its_operation_mode(dimensions: int, seed: int)
 @pytest.mark.slow
 def test_another_operation_mode_is_named_and_can_be_asked_for() -> None:
     """Beside its translations this pod has a mode in which it turns: legs 2 and 3 see all of that."""
-    robot, seed = mechanism(parse(POD), 572), 3
+    robot, seed = build_mechanism(parse(POD), 572), 3
     found = legs(robot, seed=seed)
     (other,) = found.setup.all_samples.other_modes
     assert (found.setup.all_samples.signature.motion, other.signature.motion) == ("3T", "3R")
@@ -177,15 +184,15 @@ def test_another_operation_mode_is_named_and_can_be_asked_for() -> None:
 
 def test_a_cure_cures_on_the_whole_branch() -> None:
     """Legs of this robot have closures beside each other, 0.01 rad apart; samples of two make 18 wrong cures of 36."""
-    setup = ObservedRobot.of(mechanism(parse("3(Ph*-Ra-Rb-Rb-Pj)"), 4))
+    setup = ObservedRobot.of(build_mechanism(parse("3(Ph*-Ra-Rb-Rb-Pj)"), 4))
     advice = advise(setup)
-    assert advice.cured
+    assert advice.has_sufficient_sets
     assert (len(advice.sets), advice.undecided) == (18, 0)
-    places = list(random_walk(setup.all_samples.start, 24, seed=5, steps=6))[3::4]
+    places = list(walk_randomly(setup.all_samples.start, 24, seed=5, steps=6))[3::4]
     for cure in advice.sets:
         watched = (*setup.observed, *(each.observation for each in cure.measurements))
         observation_model = replace(setup.all_samples.observation_model, observations=watched)
-        assert all(relation(at, observation_model).rank == setup.dof for at in places)
+        assert all(compute_relation(at, observation_model).rank == setup.dof for at in places)
 
 
 CASSIE = """<mujoco model="leg"><compiler eulerseq="zyx" autolimits="true"/><worldbody><body name="hip">
@@ -231,11 +238,11 @@ def test_the_distance_to_another_verdict_is_told(tilt: float, rank: int, near: b
     """Parallel rails leave a translation unseen; rails that are nearly so show it by as little as they are aslant."""
     robot = load("prrrp_parallel")
     rails = [joint for joint in robot.joints.values() if joint.type is JointType.PRISMATIC]
-    turned = replace(rails[0], axes=(rotation_about(np.array([0.0, 0.0, 1.0]), tilt) @ rails[0].axis,))
+    turned = replace(rails[0], axes=(rotate_about_axis(np.array([0.0, 0.0, 1.0]), tilt) @ rails[0].axis,))
     robot = robot.changed(joints=[turned if joint.name == turned.name else joint for joint in robot.joints.values()])
     for seed in range(3):
         verdict = legs(robot, seed=seed).sets[-1]
-        assert (verdict.rank, verdict.near) == (rank, near)
+        assert (verdict.rank, verdict.is_near_cutoff) == (rank, near)
         margin = verdict.margin
         assert margin.largest_dropped < margin.cutoff < margin.smallest_kept
         if near:
@@ -278,7 +285,7 @@ def test_a_platform_at_rest_at_a_dead_centre_moves_beyond_it() -> None:
     assert dead.dof == beside.dof == 1
     places = [member.pose("plate")[0, 3] for member in dead.configurations]
     assert max(places) < 4.0
-    assert verdict_of(dead, ("1",), dead.samples).verdict == "uncontrollable"
+    assert compute_verdict(dead, ("1",), dead.samples).verdict == "uncontrollable"
 
 
 def test_a_triangle_does_not_move() -> None:
@@ -354,5 +361,5 @@ def test_equal_parallel_rods_do_not_turn_their_plate(rods: int, seed: int) -> No
 def test_walks_that_lead_nowhere_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     all_samples = setting_of("3rrr_m1").all_samples
     monkeypatch.setattr(_Walks, "walk", lambda walks, roots: [])
-    with pytest.raises(NotSampled, match=r"of 20 random walks .* only 0 .* needed: 5; .*--at POSE"):
+    with pytest.raises(SamplingFailure, match=r"of 20 random walks .* only 0 .* needed: 5; .*--at POSE"):
         sample(all_samples.model, all_samples.observation_model, 5)

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hrsynth.geometry.ranks import largest_angle
-from hrsynth.geometry.vectors import Array, unit
+from hrsynth.geometry.ranks import compute_largest_angle
+from hrsynth.geometry.vectors import Array, normalise_vector
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.equivalence import EquivalenceCheck, check_equivalence
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
-from hrsynth.kinematics.velocity_relation import relation
+from hrsynth.kinematics.velocity_relation import compute_relation
 from hrsynth.mechanism.model import JointType, Mechanism, Motor
 from hrsynth.mechanism.observations.direction import Direction
-from hrsynth.tolerances import FOLLOWED, RANK_GAP, SAME_RELATION
+from hrsynth.tolerances import HIDDEN_ROBOT_RESIDUAL_TOL, RANK_GAP_MIN, RELATION_ANGLE_TOL
 from kinematics.robots import derived
 
 COUNT = 4
@@ -38,12 +38,12 @@ def shifted(mechanism: Mechanism, joint: str, by: Array) -> Mechanism:
 
 
 def virtual(mechanism: Mechanism) -> list[str]:
-    return [name for name, joint in mechanism.joints.items() if joint.actuated]
+    return [name for name, joint in mechanism.joints.items() if joint.is_actuated]
 
 
 def caught(certificate: EquivalenceCheck) -> bool:
     """Whether the certificate refuses, with a reason and with evidence."""
-    evidence = certificate.largest_angle > SAME_RELATION or certificate.residual > FOLLOWED
+    evidence = certificate.largest_angle > RELATION_ANGLE_TOL or certificate.residual > HIDDEN_ROBOT_RESIDUAL_TOL
     return not certificate.passed and bool(certificate.reason) and evidence
 
 
@@ -65,9 +65,9 @@ def test_the_right_one_passes(robot: str, legs: tuple[str, ...]) -> None:
     assert certificate.passed
     assert certificate.reason == ""
     assert certificate.samples == COUNT
-    assert certificate.largest_angle < SAME_RELATION
-    assert certificate.residual < FOLLOWED
-    assert certificate.smallest_gap > RANK_GAP
+    assert certificate.largest_angle < RELATION_ANGLE_TOL
+    assert certificate.residual < HIDDEN_ROBOT_RESIDUAL_TOL
+    assert certificate.smallest_gap > RANK_GAP_MIN
     assert certificate.mismatch is None
 
 
@@ -87,7 +87,7 @@ def test_a_longer_rod_is_caught(robot: str, legs: tuple[str, ...]) -> None:
         if j.name in derivation.setup.decomposition.leg(observation.leg).joints
     )
     u = hidden.links[observation.link].pose[:3, :3] @ observation.direction
-    side = unit(np.cross(u, [0, 0, 1]))
+    side = normalise_vector(np.cross(u, [0, 0, 1]))
     for direction in (u, side):
         assert caught(judged(robot, shifted(hidden, last.name, 0.01 * hidden.length * direction), *legs))
 
@@ -127,10 +127,10 @@ def test_exchanged_axes_of_a_universal_joint_are_caught(robot: str) -> None:
     wrong = exchanged(hidden, virtual(hidden)[0])
     right_twin, wrong_twin = (PinocchioModel(each, samples.model.length) for each in (hidden, wrong))
     at_zero = [
-        relation(ClosedConfiguration.of(model, model.q0), samples.observation_model).basis
+        compute_relation(ClosedConfiguration.of(model, model.q0), samples.observation_model).basis
         for model in (right_twin, wrong_twin)
     ]
-    assert largest_angle(*at_zero) < SAME_RELATION
+    assert compute_largest_angle(*at_zero) < RELATION_ANGLE_TOL
     assert caught(judged(robot, wrong))
 
 

@@ -10,16 +10,16 @@ import pytest
 
 import hrsynth
 from hrsynth.analysis.modes.assembly_mode import AssemblyMode
-from hrsynth.geometry.vectors import inverse, rotation_about, unit
+from hrsynth.geometry.vectors import invert_pose, normalise_vector, rotate_about_axis
 from hrsynth.kinematics.assembly import ASSEMBLED, BEYOND, IMPOSSIBLE, NOT_FOUND, Assembler, Assembly
 from hrsynth.kinematics.leg_paths import MotionFactor
-from hrsynth.kinematics.leg_solutions import LegEnd, closures
+from hrsynth.kinematics.leg_solutions import LegEnd, solve_path
 from hrsynth.mechanism import Joint, Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.legs import decompose
 from hrsynth.mechanism.model import JointType, Limits
 from hrsynth.mechanism.pose import Pose
-from hrsynth.present.text.poses import assembly
+from hrsynth.present.text.poses import describe_assembly
 from kinematics.placing import miss
 from strategies import deltas, planar, pods, random_direction, random_normal, random_rotation
 
@@ -48,7 +48,7 @@ def displaced(mechanism: Mechanism, rng: np.random.Generator) -> np.ndarray:
     shift = size * mechanism.length * rng.normal(size=3)
     D = np.eye(4)
     if flat or rng.random() < 0.3:
-        D[:3, :3] = rotation_about(axis, min(np.pi, 1.5 * size) * rng.uniform(-1, 1))
+        D[:3, :3] = rotate_about_axis(axis, min(np.pi, 1.5 * size) * rng.uniform(-1, 1))
     at = mechanism.links[mechanism.platform].pose[:3, 3]
     D[:3, 3] = at - D[:3, :3] @ at + (shift - axis * (axis @ shift) if flat else shift)
     return D
@@ -91,7 +91,7 @@ def test_what_is_said_of_assembly_holds_by_brute_force(kind: str, first: int, co
 def closes(mechanism: Mechanism, found: Assembly, D: np.ndarray, attach: str, point: np.ndarray | None) -> bool:
     """Whether all joints hold in the configuration, by their definition, and the platform is where it was asked for."""
     assert found.configuration is not None
-    moved = {link: found.configuration.pose(link) @ inverse(mechanism.links[link].pose) for link in mechanism.links}
+    moved = {link: found.configuration.pose(link) @ invert_pose(mechanism.links[link].pose) for link in mechanism.links}
     centre = (
         mechanism.links[attach].pose[:3, 3]
         if point is None
@@ -126,7 +126,7 @@ def shifted(part: MotionFactor, q: float) -> np.ndarray:
     if part.slides:
         D[:3, 3] = q * part.axis
     else:
-        D[:3, :3] = rotation_about(part.axis, q)
+        D[:3, :3] = rotate_about_axis(part.axis, q)
         D[:3, 3] = part.point - D[:3, :3] @ part.point
     return D
 
@@ -149,7 +149,7 @@ def test_values_that_close_a_skew_leg_are_among_those_told(first: str, second: s
         values = {each.joint: value for each, value in zip(way, q, strict=True)}
         free = replace(way[0], axis=random_direction(rng)) if first == "S" else way[0]
         D = shifted(free, q[0]) @ shifted(way[1], q[1]) @ (np.eye(4) if last == "S" else shifted(way[2], q[2]))
-        found = closures(way, LegEnd(D, 1.0, 1e-12, last != "S"))
+        found = solve_path(way, LegEnd(D, 1.0, 1e-12, last != "S"))
         assert found.miss is None, found.miss
         told += bool(found.values)
         for joint, several in found.values:
@@ -168,10 +168,10 @@ def test_the_reach_told_is_the_boundary(kind: str):
     mechanism = robot(kind, rng)
     limits = []
     for _ in range(3):
-        shift = unit(displaced(mechanism, rng)[:3, 3])
+        shift = normalise_vector(displaced(mechanism, rng)[:3, 3])
         if kind in PLANAR:
             axis = next(joint.axis for joint in mechanism.joints.values() if joint.type is JointType.REVOLUTE)
-            shift = unit(np.cross(axis, shift))
+            shift = normalise_vector(np.cross(axis, shift))
         low, high = 0.0, 10 * mechanism.length
         while high - low > 1e-6 * mechanism.length:
             D = np.eye(4)
@@ -193,7 +193,7 @@ def parallel_pod(rng: np.random.Generator, apart: float) -> Mechanism:
     for k in range(1, 7):
         foot = np.array([*rng.uniform(-1, 1, 2), 0.1 * rng.normal()])
         A, B = tilt @ foot, tilt @ (foot + [0, 0, 1] + apart * rng.normal(size=3))
-        rod = unit(B - A)
+        rod = normalise_vector(B - A)
         first = random_normal(rng, rod)
         b.link(f"lower_{k}", at=A)
         b.link(f"upper_{k}", at=B)
@@ -263,4 +263,4 @@ def test_beyond_limits_names_the_joints_of_the_closure_that_was_found() -> None:
 
 def words_of(found: Assembly) -> str:
     mode = AssemblyMode(Pose(), 0.0, 0.0, 0.0, False, found.reachable, None, found.verdict, beyond_limits=found.beyond)
-    return " ".join(assembly(mode))
+    return " ".join(describe_assembly(mode))

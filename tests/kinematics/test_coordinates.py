@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.batch.pose_continuation import reach
+from hrsynth.batch.pose_continuation import track_to_pose
 from hrsynth.description import load
-from hrsynth.geometry.vectors import rotation_from_rpy
+from hrsynth.geometry.vectors import convert_rpy_to_rotation
 from hrsynth.kinematics.continuation import track
 from hrsynth.kinematics.coordinates import Coordinates
 from oracle import exponential
@@ -67,12 +67,15 @@ def test_the_turn_of_a_planar_robot_is_its_angle_about_the_normal(seed: int):
     for value, at in coordinates.along(start, 2, (0.3, 0.3), 3):
         turn = at.pose(motion.link)[:3, :3] @ motion.home[:3, :3].T
         assert turn == pytest.approx(exponential(value * motion.normal), abs=1e-8)
-        assert reach(start, setup.all_samples.observation_model, motion.pose(at.pose(motion.link)), motion) is not None
+        assert (
+            track_to_pose(start, setup.all_samples.observation_model, motion.pose(at.pose(motion.link)), motion)
+            is not None
+        )
 
 
 def test_the_turn_about_a_tilted_axis_is_its_angle():
     """A robot that turns about one axis in space, which is not the base's z."""
-    R = rotation_from_rpy(0.5, 0.3, 0.2)
+    R = convert_rpy_to_rotation(0.5, 0.3, 0.2)
     setup = ObservedRobot.of(transformed(load("quattro"), R, np.zeros(3)), samples=3)
     start, motion = setup.all_samples.start, setup.motion
     coordinates = Coordinates.of(start, setup.all_samples.observation_model, motion)

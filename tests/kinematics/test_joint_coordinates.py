@@ -11,15 +11,15 @@ import pytest
 
 import hrsynth
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.analysis.pose_requests import asked_at
-from hrsynth.cli import execute
-from hrsynth.errors import BadRequest, PoseNotReached
+from hrsynth.analysis.pose_requests import solve_requested_poses
+from hrsynth.cli import run_command
+from hrsynth.errors import BadRequest, PoseReachFailure
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.joint_coordinates import FileCoordinates, counted_joints, read_joints
-from hrsynth.kinematics.walking import random_walk
+from hrsynth.kinematics.joint_coordinates import FileCoordinates, list_coordinate_joints, read_joints
+from hrsynth.kinematics.walking import walk_randomly
 from hrsynth.mechanism import Limits, Mechanism
-from hrsynth.mechanism.pose import JointPose, asked_pose
+from hrsynth.mechanism.pose import JointPose, parse_pose
 from kinematics.robots import ROBOTS
 from strategies import split
 
@@ -30,7 +30,7 @@ def along_line(start: ClosedConfiguration, names: list[str], wanted: dict[str, t
     """Where plain Newton steps of least norm lead, on a straight line of the coordinates in many pieces."""
     model = start.model
     places = [i for name in names for i in model.coordinates[name]]
-    units = [model.length if model.mechanism.joints[name].type.slides else 1.0 for name in names]
+    units = [model.length if model.mechanism.joints[name].type.has_translation else 1.0 for name in names]
     goal = np.concatenate([np.array(wanted[name]) / unit for name, unit in zip(names, units, strict=True)])
     begun, q = model.difference(model.q0, start.q)[places], start.q
     for k in range(1, PIECES + 1):
@@ -59,13 +59,13 @@ def test_a_configuration_is_found_again_by_its_joints(name: str, motors: bool) -
     """Where the line leads elsewhere, an independent way along it leads there too."""
     setup = ObservedRobot.of(name)
     start, link = setup.all_samples.start, setup.motion.link
-    names = [joint.name for joint in counted_joints(setup.robot) if joint.actuated == motors]
+    names = [joint.name for joint in list_coordinate_joints(setup.robot) if joint.is_actuated == motors]
     if not names or not all(name in start.model.coordinates for name in names) or not determine(start, names, link):
         pytest.skip("these joints do not say where the platform is")
-    for at in random_walk(start, 8, seed=3):
+    for at in walk_randomly(start, 8, seed=3):
         wanted = {name: read_joints(at)[name] for name in names}
-        (found,) = asked_at(setup, [JointPose(motors, tuple(wanted.items()))])
-        if isinstance(found, PoseNotReached):
+        (found,) = solve_requested_poses(setup, [JointPose(motors, tuple(wanted.items()))])
+        if isinstance(found, PoseReachFailure):
             assert found.reason.startswith(("a singularity lies ahead", "with the other coordinates fixed"))
             continue
         told = read_joints(found)
@@ -80,7 +80,7 @@ def test_coordinates_count_as_the_file_counts() -> None:
     moved = hrsynth.observe("delta", at="motors:0.1,0.2,0.3")
     told = FileCoordinates.of(moved.all_samples.start)
     assert told.motors == pytest.approx({"shoulder_1": 0.1, "shoulder_2": 0.2, "shoulder_3": 0.3}, abs=1e-9)
-    (back,) = asked_at(moved, [asked_pose("motors:0,0,0")])
+    (back,) = solve_requested_poses(moved, [parse_pose("motors:0,0,0")])
     assert isinstance(back, ClosedConfiguration)
     zero = ObservedRobot.of("delta").all_samples.start
     link = moved.motion.link
@@ -93,11 +93,13 @@ def test_the_file_counts_on_where_its_joints_were_joined_and_its_zero_has_moved(
         robot = split(robot, np.random.default_rng(seed), ("spherical",))
     moved = hrsynth.observe(robot, at="motors:0.1,0.2,0.3")
     told = FileCoordinates.of(moved.all_samples.start)
-    assert {*told.joints} == {joint.name for joint in counted_joints(robot) if not joint.actuated} != set()
+    assert {*told.joints} == {joint.name for joint in list_coordinate_joints(robot) if not joint.is_actuated} != set()
     assert told.motors == pytest.approx({"shoulder_1": 0.1, "shoulder_2": 0.2, "shoulder_3": 0.3}, abs=1e-9)
-    same = asked_at(moved, [JointPose(False, tuple((name, (value,)) for name, value in told.joints.items()))])
+    same = solve_requested_poses(
+        moved, [JointPose(False, tuple((name, (value,)) for name, value in told.joints.items()))]
+    )
     assert isinstance(same[0], ClosedConfiguration)
-    (back,) = asked_at(moved, [asked_pose("motors:0,0,0")])
+    (back,) = solve_requested_poses(moved, [parse_pose("motors:0,0,0")])
     assert isinstance(back, ClosedConfiguration)
     zero, link = ObservedRobot.of(robot).all_samples.start, moved.motion.link
     assert np.abs(back.pose(link) - zero.pose(link)).max() < 1e-8
@@ -167,25 +169,25 @@ def test_a_joint_at_its_limit_stops_the_way_and_is_named() -> None:
     free = hrsynth.check("3rrr_m1", at="motors:0.2,0.2,0.2").postures[0].coordinates
     assert free is not None
     joint, value = max(free.joints.items(), key=lambda each: abs(float(each[1])))
-    with pytest.raises(PoseNotReached, match=f"{joint} is at its limit") as refused:
+    with pytest.raises(PoseReachFailure, match=f"{joint} is at its limit") as refused:
         hrsynth.check(limited("3rrr_m1", joint, abs(float(value)) / 2), at="motors:0.2,0.2,0.2")
     assert 0.2 < refused.value.came < 0.8
 
 
 def test_motors_that_no_assembly_allows_stop_at_a_singularity() -> None:
-    with pytest.raises(PoseNotReached, match=r"a singularity lies ahead, at which shoulder_\d stops"):
+    with pytest.raises(PoseReachFailure, match=r"a singularity lies ahead, at which shoulder_\d stops"):
         hrsynth.check("delta", at="motors:5,0.2,0.3")
 
 
 def test_coordinates_that_contradict_each_other_are_refused() -> None:
-    with pytest.raises(PoseNotReached, match="with the other coordinates fixed"):
+    with pytest.raises(PoseReachFailure, match="with the other coordinates fixed"):
         hrsynth.check("3rrr_m1", at="joints:shoulder_1=0.1,shoulder_2=0,shoulder_3=0,elbow_1=0.4")
 
 
 @pytest.mark.parametrize("command", ["check", "modes", "accuracy", pytest.param("equilibria", marks=pytest.mark.slow)])
 def test_each_command_takes_them_and_tells_them(command: str, capsys) -> None:
     more = ["--cone", "0.1deg"] * (command == "accuracy")
-    assert execute([command, "3rrr_m1", "--at", "motors:0.05,0,0", "--json", *more]) == 0
+    assert run_command([command, "3rrr_m1", "--at", "motors:0.05,0,0", "--json", *more]) == 0
     told = capsys.readouterr().out
     first = next(each for each in json.loads(told).values() if isinstance(each, list) and "coordinates" in str(each))[0]
     assert first["coordinates"]["motors"] == pytest.approx(
@@ -196,16 +198,16 @@ def test_each_command_takes_them_and_tells_them(command: str, capsys) -> None:
 def test_joints_that_the_normal_form_has_joined_are_told() -> None:
     """The passive hinges of a U, and of a ball written as three R, have the coordinates that their file has."""
     setup = ObservedRobot.of("3upu")
-    (at,) = asked_at(setup, [asked_pose("motors:0.02,-0.01,0.03")])
+    (at,) = solve_requested_poses(setup, [parse_pose("motors:0.02,-0.01,0.03")])
     assert isinstance(at, ClosedConfiguration)
     robot = setup.robot
-    assert {*read_joints(at)} == {joint.name for joint in counted_joints(robot)}
+    assert {*read_joints(at)} == {joint.name for joint in list_coordinate_joints(robot)}
 
 
 def test_free_parts_stay_within_limits() -> None:
     robot = limited("i4l", "guide_2", 0.165)
-    (found,) = asked_at(ObservedRobot.of(robot), [asked_pose("joints:guide_1=-0.2")])
-    if isinstance(found, PoseNotReached):
+    (found,) = solve_requested_poses(ObservedRobot.of(robot), [parse_pose("joints:guide_1=-0.2")])
+    if isinstance(found, PoseReachFailure):
         assert "guide_2 is at its limit" in found.reason
     else:
         assert abs(read_joints(found)["guide_2"][0]) <= 0.165
@@ -217,10 +219,10 @@ def test_turns_are_not_counted_modulo_a_whole_one(angle: float) -> None:
     robot = hrsynth.load("rrrrr_m1")
     twisted = split(robot, np.random.default_rng(2))
     for each in (robot, twisted):
-        crank = next(joint.name for joint in each.joints.values() if joint.actuated)
+        crank = next(joint.name for joint in each.joints.values() if joint.is_actuated)
         try:
             at = hrsynth.check(each, at=f"joints:{crank}={angle}").postures[0]
-        except PoseNotReached:
+        except PoseReachFailure:
             continue
         assert at.coordinates is not None
         assert at.coordinates.motors[crank] == pytest.approx(angle, abs=1e-8)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hrsynth
-from hrsynth.errors import PoseNotReached
+from hrsynth.errors import PoseReachFailure
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 
@@ -45,7 +45,7 @@ def test_a_leg_that_is_stretched_at_zero_misses_only_what_is_too_far(x: float, m
     """A leg does not bend by itself: its tip at (1 − x) from its base misses what is beyond both lengths, nothing
     else."""
     assert max(0.0, 1000 * ((1 - x) - 2 * LENGTH)) == pytest.approx(misses, abs=1e-9)
-    with pytest.raises(PoseNotReached) as refused:
+    with pytest.raises(PoseReachFailure) as refused:
         hrsynth.check(stretched(), at=f"x={x - 0.3},y=0,phi=0")  # the plate's frame lies at the origin at zero
     told = re.search(r"leg 1 alone misses it by ([\d.]+) mm", str(refused.value))
     assert (float(told[1]) if told else 0.0) == pytest.approx(misses, rel=1e-3)

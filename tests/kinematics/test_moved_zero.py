@@ -15,13 +15,13 @@ from hrsynth.description import list_robots
 from hrsynth.description.assembly.loops import SINGLE, LoopAssembly
 from hrsynth.description.assembly.zero_configuration import at_file_zero, with_zero_at, zeroed_at
 from hrsynth.kinematics import limits
-from hrsynth.kinematics.assembly import of_links
+from hrsynth.kinematics.assembly import build_from_link_poses
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.locked_twists import rezero
+from hrsynth.kinematics.locked_twists import set_zero
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.model import Limits
-from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.normal import reduce_to_normal_form
 from kinematics.robots import walked
 
 
@@ -40,9 +40,9 @@ def limited(robot: Mechanism, seed: int = 0) -> Mechanism:
 def margins(model: PinocchioModel, at: ClosedConfiguration) -> dict[str, tuple[float, float]]:
     """How far each coordinate is from its two limits, turns within one."""
     found = {}
-    for name, value in limits.coordinates(model, at.q).items():
+    for name, value in limits.list_limited_coordinates(model, at.q).items():
         joint, _, lower, upper = model.mechanism.stops[name]
-        whole = np.inf if model.mechanism.joints[joint].type.slides else 2 * np.pi
+        whole = np.inf if model.mechanism.joints[joint].type.has_translation else 2 * np.pi
         found[name] = tuple(
             float(np.angle(np.exp(1j * x))) if np.isfinite(whole) else x for x in (value - lower, upper - value)
         )
@@ -53,16 +53,18 @@ def margins(model: PinocchioModel, at: ClosedConfiguration) -> dict[str, tuple[f
 @pytest.mark.parametrize("name", list_robots())
 def test_limits_and_wrists_move_with_the_zero(name: str):
     """Of balls and U joints as three and two R, in normal form, where these limit what is one joint."""
-    robot = normal_form(limited(of_hinges(hrsynth.load(name)))).mechanism
+    robot = reduce_to_normal_form(limited(of_hinges(hrsynth.load(name)))).mechanism
     model = PinocchioModel(robot)
     home = walked(model, seed=1)
-    moved = rezero(home)
+    moved = set_zero(home)
     other = PinocchioModel(moved, model.length)
     for seed in (1, 2, 3):
         there = walked(model, seed=seed, steps=2)
-        same = of_links(other, there.pose)
-        assert limits.outside(model, there.q) == limits.outside(other, same.q)
-        assert limits.wrist_margins(model, there.q) == pytest.approx(limits.wrist_margins(other, same.q), abs=1e-8)
+        same = build_from_link_poses(other, there.pose)
+        assert limits.list_joints_beyond(model, there.q) == limits.list_joints_beyond(other, same.q)
+        assert limits.compute_tilt_margins(model, there.q) == pytest.approx(
+            limits.compute_tilt_margins(other, same.q), abs=1e-8
+        )
         before, after = margins(model, there), margins(other, same)
         assert before.keys() == after.keys()
         for each, value in before.items():
@@ -76,8 +78,8 @@ def test_what_the_file_counts_is_remembered(name: str):
     robot = limited(hrsynth.load(name))
     model = PinocchioModel(robot)
     first, second = (walked(model, seed=seed) for seed in (1, 2))
-    once = rezero(first)
-    twice = rezero(of_links(PinocchioModel(once, model.length), second.pose))
+    once = set_zero(first)
+    twice = set_zero(build_from_link_poses(PinocchioModel(once, model.length), second.pose))
     values = LoopAssembly.of(twice).zero()
     for moved in (
         once,
@@ -138,7 +140,7 @@ def test_answers_are_those_of_the_same_robot(name: str):
 @pytest.mark.parametrize("name", ["prrrp_m1", "3rps", "rrrrr_m1"])
 def test_the_ranges_of_motors_are_those_of_the_same_robot(name: str, tmp_path: Path):
     robot = limited(hrsynth.load(name), seed=4)
-    moved = rezero(walked(PinocchioModel(robot), seed=3, steps=1, size=0.03))
+    moved = set_zero(walked(PinocchioModel(robot), seed=3, steps=1, size=0.03))
     one, two = hrsynth.branch(robot, max_cells=60), hrsynth.branch(moved, max_cells=60)
     for part, other in zip(one.parts, two.parts, strict=True):
         assert part.motors == other.motors

@@ -13,14 +13,14 @@ import pytest
 
 import hrsynth
 from description.foreign.test_models import FIGURES, MODELS, model
-from hrsynth.description.contents import Inertial, content_of, fragments
-from hrsynth.geometry.so3 import logarithm
-from hrsynth.geometry.vectors import Array, pose
+from hrsynth.description.contents import Inertial, collect_content, write_fragments
+from hrsynth.geometry.so3 import convert_rotations_to_vectors
+from hrsynth.geometry.vectors import Array, build_pose
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.locked_twists import rezero
+from hrsynth.kinematics.locked_twists import set_zero
 from hrsynth.kinematics.pinocchio_export import PinocchioExport
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
-from hrsynth.kinematics.walking import random_walk
+from hrsynth.kinematics.walking import walk_randomly
 from hrsynth.mechanism import Coupling, JointType, Limits, Mechanism
 from hrsynth.mechanism.builder import Builder
 from kinematics.robots import ROBOTS, walked
@@ -92,7 +92,9 @@ class Pinned:
 def apart(X: dict[str, Array], poses: dict[str, Array]) -> list[Array]:
     """The twist from where each link is to where it should be."""
     return [
-        np.concatenate([wanted[:3, 3] - X[link][:3, 3], logarithm(wanted[:3, :3] @ X[link][:3, :3].T)])
+        np.concatenate(
+            [wanted[:3, 3] - X[link][:3, 3], convert_rotations_to_vectors(wanted[:3, :3] @ X[link][:3, :3].T)]
+        )
         for link, wanted in poses.items()
     ]
 
@@ -103,7 +105,7 @@ def check_closed(robot: Mechanism, steps: int = 4) -> None:
     start, q = ClosedConfiguration.of(model, model.q0), pinned.export.q0
     assert set(pinned.links) == set(robot.links)
     assert pinned.export.closures == tuple(each.name for each in pinned.export.constraint_models)
-    for at in (start, *random_walk(start, steps, steps=steps)):
+    for at in (start, *walk_randomly(start, steps, steps=steps)):
         poses = {link: at.pose(link) for link in robot.links}
         q = q if at is start else pinned.reach(q, poses)
         missed, J = pinned.constraints(q)
@@ -123,7 +125,7 @@ def test_it_closes_and_moves_as_the_robot(name: str):
 def test_loops_of_every_type(letter: str):
     robot = cycle(CYCLES[letter], np.random.default_rng(3), welded=letter == "F")
     check_closed(robot, steps=2)
-    check_closed(rezero(walked(PinocchioModel(robot), seed=1)), steps=2)
+    check_closed(set_zero(walked(PinocchioModel(robot), seed=1)), steps=2)
 
 
 @pytest.mark.some(3)
@@ -162,7 +164,7 @@ def test_coordinates_count_from_the_zero_of_the_file(name: str):
     ]
     robot = robot.changed(joints=bounded)
     at = walked(PinocchioModel(robot), seed=2)
-    one, other = robot.to_pinocchio(), rezero(at).to_pinocchio()
+    one, other = robot.to_pinocchio(), set_zero(at).to_pinocchio()
     assert list(one.model.names) == list(other.model.names)
     for mine, theirs in zip(one.model.jointPlacements, other.model.jointPlacements, strict=True):
         np.testing.assert_allclose(mine.homogeneous, theirs.homogeneous, atol=AGREE)
@@ -234,15 +236,15 @@ def weighed(robot: Mechanism, seed: int = 0) -> Mechanism:
     which are not written for MuJoCo."""
     rng, links = np.random.default_rng(seed), []
     for link in robot.links.values():
-        content = content_of(link, robot)
-        place = pose(rng.uniform(-0.3, 0.3, 3), random_rotation(rng))
+        content = collect_content(link, robot)
+        place = build_pose(rng.uniform(-0.3, 0.3, 3), random_rotation(rng))
         own, A = content.inertial, rng.normal(size=(3, 3))
         if own is None or own.mass == 0:
             own = Inertial(rng.uniform(0.1, 2), place)
         moments = np.linalg.eigvalsh(np.zeros((3, 3)) if own.inertia is None else own.inertia)
         if not moments[0] > 0 or 2 * moments[2] > moments.sum():
             own = replace(own, inertia=0.01 * (A @ A.T + np.trace(A @ A.T) * np.eye(3)))
-        links.append(replace(link, xml=fragments(replace(content, inertial=own))))
+        links.append(replace(link, xml=write_fragments(replace(content, inertial=own))))
     return robot.changed(links=links)
 
 
@@ -280,7 +282,7 @@ class Simulated:
         for _ in range(30):
             missed, J = self.constraints()
             own = {link: self.data.body(link) for link in poses}
-            X = {link: pose(each.xpos, each.xmat.reshape(3, 3)) for link, each in own.items()}
+            X = {link: build_pose(each.xpos, each.xmat.reshape(3, 3)) for link, each in own.items()}
             step = np.linalg.lstsq(
                 np.vstack([J, self.twists(list(poses))]), np.concatenate([-missed, *apart(X, poses)]), rcond=ROWS
             )[0]
@@ -302,7 +304,7 @@ def differences(robot: Mechanism, folder: Path) -> tuple[float, float, bool]:
     acted = [other.model.joint(name).dofadr[0] for name in names]
     q, start = pinned.export.q0, ClosedConfiguration.of(robot_model, robot_model.q0)
     torques, inertias, held = 0.0, 0.0, False
-    for at in (start, *random_walk(start, 3, steps=3)):
+    for at in (start, *walk_randomly(start, 3, steps=3)):
         poses = {link: at.pose(link) for link in robot.links}
         q = pinned.reach(q, poses)
         other.reach(poses)

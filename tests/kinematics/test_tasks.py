@@ -7,11 +7,11 @@ import pytest
 
 from hrsynth.analysis.pose_requests import observe
 from hrsynth.errors import UndefinedValue
-from hrsynth.geometry.gauss_newton import Damping, Residual, descend, descend_together
+from hrsynth.geometry.gauss_newton import DampingFactor, Residual, descend, descend_together
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.path_tracking import track_paths
 from hrsynth.kinematics.tasks import solve
-from hrsynth.tolerances import PASSED_BY, SOLVED
+from hrsynth.tolerances import CLOSURE_SOLVER_TOL, WAYPOINT_RESIDUAL_TOL
 from kinematics.robots import setting_of
 
 
@@ -30,15 +30,21 @@ def test_together_every_way_ends_where_it_ends_alone(robot: str, sensor: tuple[s
         assert not isinstance(led, UndefinedValue)
         q, residual = model.q0, 0.0
         for target in way:
-            q, residual = solve(model, q, target, tolerance=SOLVED if target is way[-1] else PASSED_BY, iterations=120)
+            q, residual = solve(
+                model,
+                q,
+                target,
+                tolerance=CLOSURE_SOLVER_TOL if target is way[-1] else WAYPOINT_RESIDUAL_TOL,
+                iterations=120,
+            )
         np.testing.assert_array_equal(led[0], q)
-        assert led[1] == residual <= SOLVED
+        assert led[1] == residual <= CLOSURE_SOLVER_TOL
 
 
 def test_one_that_diverges_leaves_the_others_as_they_are() -> None:
     """x² = a from several starts; of a < 0 there is no root."""
     wanted = {0: 4.0, 1: -1.0, 2: 9.0}
-    damping = Damping(start=1e-3, eased=0.1, least=1e-9, most=1e6)
+    damping = DampingFactor(start=1e-3, eased=0.1, least=1e-9, most=1e6)
 
     def system(x: Array, a: float) -> tuple[Array, Array]:
         return x * x - a, np.array([2 * x])

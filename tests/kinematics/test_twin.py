@@ -13,7 +13,7 @@ from hrsynth.errors import BadMechanism
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
-from hrsynth.kinematics.velocity_relation import ObservationModel, relation
+from hrsynth.kinematics.velocity_relation import ObservationModel, compute_relation
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Joint, JointType, Mechanism, Motor
 from kinematics.robots import ROBOTS, seen_by_oracle, setting_of, state_of, walked
@@ -78,7 +78,7 @@ def agrees(at: ClosedConfiguration, observation_model: ObservationModel) -> None
     kernel, rank = at.kernel()
     assert rank.gap > 1e3
     assert oracle.mobility(state) == kernel.shape[1]
-    ours = relation(at, observation_model)
+    ours = compute_relation(at, observation_model)
     assert ours.mobility == kernel.shape[1]
     theirs = seen_by_oracle(oracle, state, observation_model, at.model.length)
     assert same_relation(ours.basis, theirs) < AGREE
@@ -236,8 +236,8 @@ def test_length_only_scales() -> None:
     at = ClosedConfiguration.of(other, other.q0)
     np.testing.assert_allclose(at.pose("platform"), all_samples.start.pose("platform"), atol=1e-14)
     basis = seen_by_oracle(Oracle(mechanism), state_of(other, other.q0), observation_model, 3 * mechanism.length)
-    assert same_relation(relation(at, observation_model).basis, basis) < AGREE
-    assert same_relation(relation(all_samples.start, observation_model).basis, basis) > 0.1
+    assert same_relation(compute_relation(at, observation_model).basis, basis) < AGREE
+    assert same_relation(compute_relation(all_samples.start, observation_model).basis, basis) > 0.1
 
 
 def test_a_motor_on_a_floating_joint_that_others_hold_is_refused() -> None:
@@ -250,7 +250,7 @@ def test_a_motor_on_a_floating_joint_that_others_hold_is_refused() -> None:
 
 def test_actuated_coordinates_are_those_of_the_motors() -> None:
     model = setting_of("quattro").all_samples.model
-    names = [joint.name for joint in model.mechanism.joints.values() if joint.actuated]
+    names = [joint.name for joint in model.mechanism.joints.values() if joint.is_actuated]
     assert len(names) == 4
     assert model.actuated_indices() == [i for name in names for i in model.coordinates[name]]
     assert len(set(model.actuated_indices())) == 4
@@ -274,7 +274,7 @@ def test_of_two_floating_joints_the_same_is_idle_with_gears() -> None:
             with pytest.raises(BadMechanism, match=f"got '{name}'"):
                 PinocchioModel(driven)
         else:
-            assert PinocchioModel(driven).mechanism.joints[name].actuated
+            assert PinocchioModel(driven).mechanism.joints[name].is_actuated
 
 
 def test_motors_on_a_ball_at_which_a_loop_is_cut_hold_both_links_together() -> None:

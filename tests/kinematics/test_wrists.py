@@ -8,16 +8,16 @@ import pytest
 
 from hrsynth.analysis.check import check
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.batch.pose_continuation import reach
-from hrsynth.errors import PoseNotReached
-from hrsynth.geometry.so3 import logarithm
-from hrsynth.geometry.vectors import rotation_about
+from hrsynth.batch.pose_continuation import track_to_pose
+from hrsynth.errors import PoseReachFailure
+from hrsynth.geometry.so3 import convert_rotations_to_vectors
+from hrsynth.geometry.vectors import rotate_about_axis
 from hrsynth.kinematics.assembly import ASSEMBLED, BEYOND, Assembler
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.limits import CoordinateIntervals, wrist_margins
+from hrsynth.kinematics.limits import CoordinateIntervals, compute_tilt_margins
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
-from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.normal import reduce_to_normal_form
 from hrsynth.mechanism.pose import Pose
 from strategies import oblique, pods, random_direction, random_rotation, serial, transformed
 
@@ -27,7 +27,7 @@ Rng = np.random.Generator
 def product(axes: list[np.ndarray], angles: np.ndarray) -> np.ndarray:
     R = np.eye(3)
     for axis, angle in zip(axes, angles, strict=True):
-        R = R @ rotation_about(axis, angle)
+        R = R @ rotate_about_axis(axis, angle)
     return R
 
 
@@ -43,8 +43,8 @@ def three_angles(axes: list[np.ndarray], R: np.ndarray) -> np.ndarray | None:
     def turn(axis: np.ndarray, one: np.ndarray, other: np.ndarray) -> float:
         return float(np.arctan2(axis @ np.cross(one, other), one @ other - (axis @ one) * (axis @ other)))
 
-    first = turn(a, rotation_about(b, second) @ c, R @ c)
-    rest = logarithm((rotation_about(a, first) @ rotation_about(b, second)).T @ R)
+    first = turn(a, rotate_about_axis(b, second) @ c, R @ c)
+    rest = convert_rotations_to_vectors((rotate_about_axis(a, first) @ rotate_about_axis(b, second)).T @ R)
     angles = np.array([first, second, rest @ c])
     np.testing.assert_allclose(product(axes, angles), R, atol=1e-6)
     return angles
@@ -78,7 +78,7 @@ def test_the_interval_is_what_the_axes_reach(types: str, seed: int) -> None:
         if letter == "U":
             axes.append(np.cross(axes[-1], random_direction(rng)))
             axes[-1] /= np.linalg.norm(axes[-1])
-    mechanism = normal_form(chain(axes, rng, types)).mechanism
+    mechanism = reduce_to_normal_form(chain(axes, rng, types)).mechanism
     (joint,) = (joint for name, joint in mechanism.joints.items() if name != "loop")
     assert joint.type == "S"
     if joint.predecessor != "base":
@@ -106,9 +106,9 @@ def test_perpendicular_neighbours_make_every_turn() -> None:
     rng = np.random.default_rng(0)
     first, second, third = random_rotation(rng).T
     for types in ("RRR", "UR", "RU"):
-        assert not normal_form(chain([first, second, third], rng, types)).mechanism.tilt_limits
-    lean = rotation_about(first, 0.3) @ third
-    assert normal_form(chain([first, second, lean], rng, "UR")).mechanism.tilt_limits
+        assert not reduce_to_normal_form(chain([first, second, third], rng, types)).mechanism.tilt_limits
+    lean = rotate_about_axis(first, 0.3) @ third
+    assert reduce_to_normal_form(chain([first, second, lean], rng, "UR")).mechanism.tilt_limits
 
 
 def robots(seed: int) -> tuple[ObservedRobot, ObservedRobot, list[np.ndarray]]:
@@ -126,7 +126,7 @@ def turned_platforms(free: ObservedRobot, rng: Rng, count: int) -> list[np.ndarr
     mechanism, found = free.mechanism, []
     for _ in range(count):
         D, centre = np.eye(4), mechanism.joints["tip_1"].point
-        D[:3, :3] = rotation_about(random_direction(rng), rng.uniform(0.05, 1.1))
+        D[:3, :3] = rotate_about_axis(random_direction(rng), rng.uniform(0.05, 1.1))
         D[:3, 3] = centre - D[:3, :3] @ centre
         found.append(D @ mechanism.links["platform"].pose)
     return found
@@ -159,7 +159,7 @@ def test_a_robot_is_assembled_where_its_three_axes_can_turn(seed: int) -> None:
         seen.add(possible)
         assert (found.verdict, found.beyond) == ((ASSEMBLED, ()) if possible else (BEYOND, (name,)))
         for value in (
-            wrist_margins(at.model, at.q)[name],
+            compute_tilt_margins(at.model, at.q)[name],
             CoordinateIntervals.of(at.model, at.q).margins(at.model, at.q)[name],
             at.model.mechanism.tilt_limits[name].margin(),
         ):
@@ -167,10 +167,10 @@ def test_a_robot_is_assembled_where_its_three_axes_can_turn(seed: int) -> None:
     assert seen == {True, False}
 
 
-def reached(setup: ObservedRobot, pose: Pose) -> ClosedConfiguration | PoseNotReached:
+def reached(setup: ObservedRobot, pose: Pose) -> ClosedConfiguration | PoseReachFailure:
     try:
-        return reach(setup.all_samples.start, setup.all_samples.observation_model, pose, setup.motion)
-    except PoseNotReached as error:
+        return track_to_pose(setup.all_samples.start, setup.all_samples.observation_model, pose, setup.motion)
+    except PoseReachFailure as error:
         return error
 
 
@@ -203,7 +203,7 @@ def test_check_says_where_three_axes_lie_in_a_plane(apart: float) -> None:
     rng = np.random.default_rng(3)
     free = pods(["RPS", *["UPS"] * 4], rng, square=True)
     first, second, _ = random_rotation(rng).T
-    axes = [first, second, rotation_about(second, apart) @ first]
+    axes = [first, second, rotate_about_axis(second, apart) @ first]
     found = check(serial(free, rng, free.joints["tip_1"], axes))
     assert np.linalg.svd(np.array(axes), compute_uv=False)[-1] == pytest.approx(apart / np.sqrt(2), rel=1e-1)
     (posture,) = found.postures

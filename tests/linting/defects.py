@@ -47,7 +47,7 @@ def sound(name: str = "3rrr_m1", ending: str = ".urdf", folder: Path | None = No
     for link in [each for each in root.iter("link", "body") if len(each.attrib) and each.find("inertial") is None]:
         if "__" not in (link.get("name") or "") and "base" not in (link.get("name") or ""):
             link.insert(0, inertial(dialect))
-    driven = {each.name for each in load(name).joints.values() if each.actuated}
+    driven = {each.name for each in load(name).joints.values() if each.is_actuated}
     for joint in [each for each in root.iter("joint") if each.get("name") in driven]:
         limited(joint, dialect, radians(-75), radians(85))
     etree.indent(root)

@@ -11,10 +11,10 @@ from jsonschema import Draft202012Validator
 
 import hrsynth
 from description.foreign.examples import FILES
-from hrsynth.cli import execute
+from hrsynth.cli import run_command
 from hrsynth.linting.findings import SEVERITIES
 from hrsynth.linting.rules import lint_rules
-from hrsynth.present.text.lint import github, sarif
+from hrsynth.present.text.lint import format_github, format_sarif
 from linting.defects import CASES, damaged, put, sound
 from tables import lint_rules as page
 from tables.markdown import block
@@ -150,7 +150,7 @@ def bad(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_sarif_is_as_its_schema_says(bad: Path):
     found = hrsynth.lint([bad, "quattro"], ignore="assumed")
-    log = json.loads(sarif(found))
+    log = json.loads(format_sarif(found))
     Draft202012Validator.check_schema(SARIF)
     assert [each.message for each in Draft202012Validator(SARIF).iter_errors(log)] == []
     (run,) = log["runs"]
@@ -168,7 +168,7 @@ def test_sarif_is_as_its_schema_says(bad: Path):
 
 def test_annotations_of_github_are_escaped(bad: Path):
     found = hrsynth.lint(bad)
-    lines = github(found).splitlines()
+    lines = format_github(found).splitlines()
     assert len(lines) == len(found.findings)
     shape = re.compile(r"::(error|warning|notice) file=[^,:]*(,line=\d+)?,title=[\w-]+::.+")
     assert all(shape.fullmatch(line) for line in lines)
@@ -206,7 +206,7 @@ def test_text_names_place_rule_and_mend(bad: Path):
     ],
 )
 def test_the_exit_status_tells(bad: Path, capsys, arguments: list[str], status: int):
-    assert execute(["lint", str(bad), *arguments]) == status
+    assert run_command(["lint", str(bad), *arguments]) == status
     printed = capsys.readouterr()
     assert (printed.out == "") is (status == 2 and arguments != ["more.urdf"])  # what can be read is told
     assert bool(printed.err) is (status == 2)
@@ -221,15 +221,15 @@ def test_what_can_be_read_is_told_where_other_files_cannot(bad: Path, tmp_path: 
     assert [each.to_dict() for each in found.findings] == [each.to_dict() for each in alone.findings]
     assert [each.file for each in found.unread] == [str(broken), "more.urdf"]
     assert found.headline() == f"{alone.headline()}; 2 more could not be read"
-    assert execute(["lint", str(broken), str(bad)]) == 2
+    assert run_command(["lint", str(broken), str(bad)]) == 2
     printed = capsys.readouterr()
     assert printed.out.startswith(str(alone).rsplit("\n", 1)[0])
     assert printed.err == f"hrsynth: {broken}:2: {found.unread[0].text}\n"
-    assert github(found).startswith(f"::error file={broken},line=2,title=unread::malformed XML")
-    log = json.loads(sarif(found))
+    assert format_github(found).startswith(f"::error file={broken},line=2,title=unread::malformed XML")
+    log = json.loads(format_sarif(found))
     assert [each.message for each in Draft202012Validator(SARIF).iter_errors(log)] == []
     assert not log["runs"][0]["invocations"][0]["executionSuccessful"]
-    assert execute(["lint", str(broken), "more.urdf"]) == 2
+    assert run_command(["lint", str(broken), "more.urdf"]) == 2
     assert capsys.readouterr().out == ""
 
 
@@ -254,19 +254,19 @@ def test_a_refusal_in_another_file_on_the_same_line_is_told(tmp_path: Path):
 
 
 def test_json_and_fix_on_the_command_line(bad: Path, capsys):
-    assert execute(["lint", str(bad), "--fix", "-o", "mended.urdf", "--format", "json"]) == 0
+    assert run_command(["lint", str(bad), "--fix", "-o", "mended.urdf", "--format", "json"]) == 0
     record = json.loads(capsys.readouterr().out)
     assert record["file"] == "mended.urdf"
     assert [(each["rule"], each["fixable"]) for each in record["fixed"]] == [("limits-order", True)]
     assert record["counts"]["error"] == 0
-    assert execute(["lint", str(bad), "--fix"]) == 0
+    assert run_command(["lint", str(bad), "--fix"]) == 0
     assert f"The fixed file is written to {bad}." in capsys.readouterr().out
     assert bad.read_text() == Path("mended.urdf").read_text()
 
 
 def test_a_file_that_cannot_be_written_is_left_as_it_is(bad: Path, capsys):
     before = bad.read_bytes()
-    assert execute(["lint", str(bad), "--fix", "-o", "no/such/folder.urdf"]) == 2
+    assert run_command(["lint", str(bad), "--fix", "-o", "no/such/folder.urdf"]) == 2
     assert capsys.readouterr().err.startswith("hrsynth: cannot write the file")
     assert bad.read_bytes() == before
     assert sorted(each.name for each in Path().rglob("*")) == ["a b", bad.name]
@@ -327,12 +327,12 @@ def test_a_fix_follows_no_link_that_is_not_named(door: str, tmp_path: Path, caps
     (folder / "robot.yaml").write_text(files["robot.yaml"])
     other.write_text(text)
     (folder / "robot.urdf").symlink_to(other)
-    assert execute(["lint", str(folder / door), "--fix"]) == 2
+    assert run_command(["lint", str(folder / door), "--fix"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert str(folder / "robot.urdf") in line
     assert other.read_text() == text
     assert (folder / "robot.urdf").is_symlink()
-    assert execute(["lint", str(folder / door), "--fix", "-o", str(tmp_path / "mended.urdf")]) in (0, 1)
+    assert run_command(["lint", str(folder / door), "--fix", "-o", str(tmp_path / "mended.urdf")]) in (0, 1)
     assert other.read_text() == text
-    execute(["lint", str(folder / "robot.urdf"), "--fix"])
+    run_command(["lint", str(folder / "robot.urdf"), "--fix"])
     assert other.read_text() != text

@@ -17,7 +17,7 @@ from description.foreign.fuzz import mutated, originals
 from hrsynth.description import load, native
 from hrsynth.errors import HrsynthError
 from hrsynth.mechanism import Mechanism
-from hrsynth.present.text.lint import github, sarif
+from hrsynth.present.text.lint import format_github, format_sarif
 from linting.defects import Damage, Root, again, both, damaged, inertial, limited, put
 from strategies import delta_like, planar_robots, random_rotation, transformed
 
@@ -94,8 +94,8 @@ def outcome(files: dict[str, str], folder: Path, *, fix: bool) -> str:
     except HrsynthError:
         return "refused"
     assert str(found)
-    assert sarif(found)
-    assert len(github(found).splitlines()) == len(found.findings)
+    assert format_sarif(found)
+    assert len(format_github(found).splitlines()) == len(found.findings)
     if fix:
         assert not any(each.fixable for each in found.findings)
     return "mended" if found.written else "read"

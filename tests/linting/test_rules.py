@@ -16,10 +16,10 @@ from description.foreign.rounded import exported, of_hinges
 from description.foreign.test_dialects import written
 from hrsynth.description import list_robots, load, save
 from hrsynth.errors import BadRequest, BadRobotFile
-from hrsynth.linting.elements import inertials
+from hrsynth.linting.elements import list_inertials
 from hrsynth.linting.linted_file import LintedFile
 from hrsynth.linting.rules import lint_rules
-from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.normal import reduce_to_normal_form
 from linting.defects import CASES, Case, damaged, foreign, put, rounded, sound
 from strategies import planar, random_rotation, transformed
 
@@ -43,7 +43,7 @@ def sound_file(robot: str, ending: str, shelf: Path) -> tuple[Path, Counter[str]
     path = shelf / f"{robot}_sound{ending}"
     path.write_text(sound(robot, ending, shelf))
     found = hrsynth.lint(path)
-    assert not found.reaches("warning")
+    assert not found.has_severity("warning")
     return path, Counter(each.rule for each in found.findings)
 
 
@@ -224,9 +224,9 @@ def test_an_inertia_is_mended_to_the_nearest_of_a_body(tmp_path: Path, shelf: Pa
     """Principal moments a ≥ b + c become those of a plate: the second moments that were not negative stay."""
     case = next(each for each in CASES if each.rule == "inertia-triangle" and each.ending == ".urdf")
     _, two = files(case, tmp_path, shelf)
-    (before,) = [each for each in inertials(LintedFile(two)) if each.inertia[2, 2] == 0.09]
+    (before,) = [each for each in list_inertials(LintedFile(two)) if each.inertia[2, 2] == 0.09]
     hrsynth.lint(two, fix=True)
-    (after,) = [each for each in inertials(LintedFile(two)) if each.link == before.link]
+    (after,) = [each for each in list_inertials(LintedFile(two)) if each.link == before.link]
     for inertia, lowest in ((before.inertia, -0.05), (after.inertia, 0.0)):
         moments = np.sort(np.linalg.eigvalsh(inertia))
         assert moments[0] + moments[1] - moments[2] == pytest.approx(2 * lowest * 0.4, abs=0.005)
@@ -295,7 +295,7 @@ def test_rounded_loops_are_not_closed_by_moving_joints(name: str, tmp_path: Path
     assert {each.rule for each in found.fixed} == {"geometry-rounded"}
     after = load(path, as_written=True)
     assert [text for text in after.differences(before, 1e-9) if not text.startswith("pose of link")] == []
-    assert normal_form(after).mechanism.joints.keys() == normal_form(before).mechanism.joints.keys()
+    assert reduce_to_normal_form(after).mechanism.joints.keys() == reduce_to_normal_form(before).mechanism.joints.keys()
 
 
 def test_a_file_that_is_near_to_two_robots_is_left_to_a_person(tmp_path: Path):

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from hrsynth.geometry.vectors import Array, inverse, unit
+from hrsynth.geometry.vectors import Array, invert_pose, normalise_vector
 from hrsynth.mechanism import Direction, Mechanism
 from hrsynth.mechanism.incidences import Incidences, recognise
 from hrsynth.mechanism.legs import decompose
-from hrsynth.mechanism.normal import normal_form
-from hrsynth.mechanism.sensors import default_observation
+from hrsynth.mechanism.normal import reduce_to_normal_form
+from hrsynth.mechanism.sensors import choose_default_segment
 from hrsynth.mechanism.structural_incidences import GeometricIncidence
 from oracle import Oracle
 
@@ -31,16 +31,16 @@ def segments(mechanism: Mechanism) -> list[Direction]:
 
 def observed(mechanism: Mechanism) -> Mechanism:
     """The normal form with the default segments of its legs."""
-    decomposition = decompose(normal_form(mechanism).mechanism)
+    decomposition = decompose(reduce_to_normal_form(mechanism).mechanism)
     return decomposition.mechanism.changed(
-        observations=tuple(default_observation(decomposition, leg) for leg in decomposition.legs)
+        observations=tuple(choose_default_segment(decomposition, leg) for leg in decomposition.legs)
     )
 
 
 def miss(tie: GeometricIncidence, mechanism: Mechanism, relations: Incidences, state: Array) -> float:
     """By how much a relation fails in a state of the oracle: a sine, or characteristic lengths; 0 where a centre of it
     is none of a joint."""
-    moved = {name: state[i] @ inverse(link.pose) for i, (name, link) in enumerate(mechanism.links.items())}
+    moved = {name: state[i] @ invert_pose(link.pose) for i, (name, link) in enumerate(mechanism.links.items())}
     joints = {number: mechanism.joints[name] for name, number in relations.centres.items()}
     if any(number not in joints for number in (*(n for n, _ in tie.terms), *(tie.sight.points if tie.sight else ()))):
         return 0.0
@@ -69,10 +69,10 @@ def miss(tie: GeometricIncidence, mechanism: Mechanism, relations: Incidences, s
             (o,) = (o for o in segments(mechanism) if o.link == tie.links[0])
             u = state[list(mechanism.links).index(o.link), :3, :3] @ o.direction
             if tie.sight.kind == "normal":
-                return across(u, unit(np.cross(*D)))
+                return across(u, normalise_vector(np.cross(*D)))
             j, k = tie.sight.points
             along = centre(k) - centre(j)
-            return across(u, unit(along - sum((d * (d @ along) for d in D), np.zeros(3))))
+            return across(u, normalise_vector(along - sum((d * (d @ along) for d in D), np.zeros(3))))
     vector = sum((sign * centre(number) for number, sign in tie.terms), np.zeros(3))
     match tie.kind:
         case "zero":

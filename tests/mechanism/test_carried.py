@@ -15,7 +15,7 @@ from hrsynth.geometry.vectors import Array
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.incidences import Incidences
-from hrsynth.mechanism.structural_incidences import GeometricIncidence, carried_by_joints, ties
+from hrsynth.mechanism.structural_incidences import GeometricIncidence, find_structural_incidences, list_incidences
 from mechanism.relating import miss, observed, recognised, walked
 from oracle import NotAssembled, Oracle, Undecided
 from strategies import parallel_robots, planar, random_rotation, spherical, transformed
@@ -40,8 +40,10 @@ def scattered(mechanism: Mechanism, tries: int, seed: int) -> Iterator[Array]:
 
 
 def by_the_file(mechanism: Mechanism, relations: Incidences) -> list[GeometricIncidence]:
-    every = ties(relations)
-    return [tie for tie, holds in zip(every, carried_by_joints(mechanism, relations, every), strict=True) if holds]
+    every = list_incidences(relations)
+    return [
+        tie for tie, holds in zip(every, find_structural_incidences(mechanism, relations, every), strict=True) if holds
+    ]
 
 
 def check(mechanism: Mechanism, seed: int, tries: int) -> int:
@@ -87,7 +89,7 @@ def test_planar_and_spherical_robots_are_carried_whole() -> None:
         rng = np.random.default_rng(seed)
         for robot in (planar(["RRR", "RPR", "PRR"], rng, [{0}] * 3), spherical(rng)):
             relations = recognised(robot, walked(robot, 2, seed))
-            assert all(carried_by_joints(robot, relations, ties(relations)))
+            assert all(find_structural_incidences(robot, relations, list_incidences(relations)))
 
 
 def test_a_relation_across_a_joint_that_breaks_it_is_not_carried() -> None:
@@ -108,10 +110,10 @@ def test_a_relation_across_a_joint_that_breaks_it_is_not_carried() -> None:
         builder.observe("1", "link_3", (0.3, 0.4, 0.5))
         robot = builder.build(platform="link_3")
         relations = recognised(robot, walked(robot, 0, seed=0))
-        every = ties(relations)
+        every = list_incidences(relations)
         same = [
             (tie, holds)
-            for tie, holds in zip(every, carried_by_joints(robot, relations, every), strict=True)
+            for tie, holds in zip(every, find_structural_incidences(robot, relations, every), strict=True)
             if tie.kind == "same"
         ]
         across = [known for tie, known in same if {"link_0", "link_3"} & set(tie.links)]
@@ -123,7 +125,7 @@ def test_a_relation_across_a_joint_that_breaks_it_is_not_carried() -> None:
 def test_words_of_relations_name_joints() -> None:
     robot = observed(load("delta"))
     relations = recognised(robot, walked(robot, 2, seed=1))
-    words = {tie.words(relations) for tie in ties(relations)}
+    words = {tie.words(relations) for tie in list_incidences(relations)}
     assert any("a parallelogram except for slides along" in text or ": a parallelogram" in text for text in words)
     assert all(any(name in text for name in robot.joints) or "observed" in text for text in words)
 
@@ -133,5 +135,5 @@ def test_a_watched_link_is_kept_with_its_relation() -> None:
     relations = recognised(robot, walked(robot, 2, seed=1))
     assert relations.watched == tuple(o.link for o in robot.observations)
     tie = GeometricIncidence("seen", links=("platform",), sight=relations.sights[0])
-    assert not carried_by_joints(robot, relations, [tie])[0]
-    assert carried_by_joints(robot, relations, [replace(tie, links=(relations.watched[0],))])[0]
+    assert not find_structural_incidences(robot, relations, [tie])[0]
+    assert find_structural_incidences(robot, relations, [replace(tie, links=(relations.watched[0],))])[0]

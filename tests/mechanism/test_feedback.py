@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hrsynth.geometry.vectors import Array, inverse, pose, unit
+from hrsynth.geometry.vectors import Array, build_pose, invert_pose, normalise_vector
 from hrsynth.mechanism.cameras import CameraObservation, NamedCamera
-from hrsynth.mechanism.images import HALF_PICTURE
+from hrsynth.mechanism.images import IMAGE_LINE_HALF_WIDTH_FRACTION
 from hrsynth.mechanism.observation import Observation
-from hrsynth.mechanism.observations import kinds
+from hrsynth.mechanism.observations import list_kinds
 from hrsynth.mechanism.observations.encoder import AngleEncoder, SlideEncoder
 from hrsynth.mechanism.observations.image_circle import ImageCircle
 from hrsynth.mechanism.observations.image_line import ImageLine
@@ -40,7 +40,7 @@ def in_sight(rng: Rng, kind: type[Observation], side: int = 1) -> tuple[Observat
 
 def camera_frame(seen: CameraObservation, X_c: Array, X: Array) -> tuple[Array, Array]:
     """B and d in the camera's frame."""
-    relative = inverse(X_c @ seen.view) @ X
+    relative = invert_pose(X_c @ seen.view) @ X
     axis = np.zeros(3) if seen.axis is None else seen.axis
     return relative[:3, :3] @ seen.at + relative[:3, 3], relative[:3, :3] @ axis
 
@@ -152,7 +152,7 @@ def test_what_is_fed_back_is_what_a_picture_shows(rng: Rng) -> None:
     )
     found = found + [0, 0, 0.0625, 0, 0.0625]
     p, d = camera_frame(circle, X_c, X)
-    one = unit(np.cross(d, [0.3, 0.5, 0.8]))
+    one = normalise_vector(np.cross(d, [0.3, 0.5, 0.8]))
     angles = np.linspace(0, 2 * np.pi, 20001)
     around = p + abs(circle.radius or 0) * (np.outer(np.cos(angles), one) + np.outer(np.sin(angles), np.cross(d, one)))
     x, y = (around[:, :2] / around[:, 2:]).T
@@ -181,12 +181,12 @@ def test_a_camera_sees_what_is_in_front_and_inside_of_its_picture() -> None:
         ((0, -0.31, 1), True, False),
     ):
         for camera, seen in ((wide, ahead), (small, inside)):
-            assert (ImagePoint("p", "l", camera=camera).in_front(X_c, pose(place, R)) > 0) is seen
+            assert (ImagePoint("p", "l", camera=camera).in_front(X_c, build_pose(place, R)) > 0) is seen
     circle = ImageCircle("p", "l", axis=np.array([1.0, 0, 0]), radius=0.5, camera=wide)
-    assert circle.in_front(X_c, pose((0, 0, 0.51), R)) > 0 > circle.in_front(X_c, pose((0, 0, 0.49), R))
+    assert circle.in_front(X_c, build_pose((0, 0, 0.51), R)) > 0 > circle.in_front(X_c, build_pose((0, 0, 0.49), R))
 
 
-@pytest.mark.parametrize("kind", [kind for kind in kinds().values() if kind.found_by], ids=lambda kind: kind.kind)
+@pytest.mark.parametrize("kind", [kind for kind in list_kinds().values() if kind.found_by], ids=lambda kind: kind.kind)
 @settings(max_examples=10, deadline=None)
 @given(rng=SEEDS)
 def test_sensors_are_wrong_by_no_more_than_is_said(kind: type[Observation], rng: Rng) -> None:
@@ -210,14 +210,14 @@ def test_sensors_are_wrong_by_no_more_than_is_said(kind: type[Observation], rng:
         if kind is ImageLine:
             rho, theta = seen.error(value + off[0], value)
             assert abs(rho) <= 1.01 * amount / 500
-            assert abs(theta) <= 1.01 * amount / 500 / HALF_PICTURE
+            assert abs(theta) <= 1.01 * amount / 500 / IMAGE_LINE_HALF_WIDTH_FRACTION
 
 
 def test_what_lies_behind_is_not_in_sight() -> None:
     """The sign of the sine of sight is that of the depth, wherever the camera is."""
     rng = np.random.default_rng(2)
     for _ in range(200):
-        camera = NamedCamera("eye", "c", pose(rng.normal(size=3), random_rotation(rng)))
+        camera = NamedCamera("eye", "c", build_pose(rng.normal(size=3), random_rotation(rng)))
         seen, X_c, X = ImagePoint("p", "l", at=rng.normal(size=3), camera=camera), random_pose(rng), random_pose(rng)
         assert np.sign(seen.in_front(X_c, X)) == np.sign(camera_frame(seen, X_c, X)[0][2])
 

@@ -28,15 +28,15 @@ def both(joined: list[tuple[str, str]], within: set[str] | None) -> tuple[graphs
     graph: nx.Graph[str] = nx.Graph()
     graph.add_nodes_from(NODES)
     graph.add_edges_from(joined)
-    return graphs.adjacency(NODES, joined), graph if within is None else graph.subgraph(within)
+    return graphs.build_adjacency(NODES, joined), graph if within is None else graph.subgraph(within)
 
 
 @given(edges, some)
 def test_distances_and_components(joined, within):
     ours, theirs = both(joined, within)
-    assert graphs.distances(ours, "n0", within) == nx.single_source_shortest_path_length(theirs, "n0")
-    assert graphs.component(ours, "n0", within) == nx.node_connected_component(theirs, "n0")
-    found = list(graphs.components(ours, within))
+    assert graphs.count_edges(ours, "n0", within) == nx.single_source_shortest_path_length(theirs, "n0")
+    assert graphs.find_component(ours, "n0", within) == nx.node_connected_component(theirs, "n0")
+    found = list(graphs.list_components(ours, within))
     assert sorted(map(sorted, found)) == sorted(map(sorted, nx.connected_components(theirs)))
     assert [min(part, key=NODES.index) for part in found] == sorted(
         (min(part, key=NODES.index) for part in found), key=NODES.index
@@ -46,7 +46,7 @@ def test_distances_and_components(joined, within):
 @given(edges, some)
 def test_paths(joined, within):
     ours, theirs = both(joined, within)
-    found = list(graphs.paths(ours, "n0", "n1", within))
+    found = list(graphs.list_paths(ours, "n0", "n1", within))
     assert sorted(found) == sorted(nx.all_simple_paths(theirs, "n0", "n1"))
 
 
@@ -54,10 +54,10 @@ def test_paths(joined, within):
 def test_a_shortest_path(joined):
     ours, theirs = both(joined, None)
     if nx.has_path(theirs, "n0", "n1"):
-        assert graphs.shortest_path(ours, "n0", "n1") in list(nx.all_shortest_paths(theirs, "n0", "n1"))
+        assert graphs.find_shortest_path(ours, "n0", "n1") in list(nx.all_shortest_paths(theirs, "n0", "n1"))
     else:
         with pytest.raises(KeyError):
-            graphs.shortest_path(ours, "n0", "n1")
+            graphs.find_shortest_path(ours, "n0", "n1")
 
 
 @given(st.lists(st.tuples(pairs, st.integers(0, 2)), max_size=14))
@@ -68,10 +68,10 @@ def test_the_same_spanning_tree_and_the_same_order(weighted):
     graph.add_nodes_from(NODES)
     for bond, (_, weight) in zip(bonds, weighted, strict=True):
         graph.add_edge(*bond.links, key=bond.number, weight=weight)
-    chosen = graphs.spanning_forest(NODES, bonds, [weight for _, weight in weighted])
+    chosen = graphs.build_spanning_forest(NODES, bonds, [weight for _, weight in weighted])
     theirs = [key for _, _, key in nx.minimum_spanning_edges(graph, keys=True, data=False)]
     assert [bond.number for bond in chosen] == theirs
     tree: nx.Graph[str] = nx.Graph()
     tree.add_nodes_from(NODES)
     tree.add_edges_from(bond.links for bond in chosen)
-    assert [(near, far) for _, near, far in graphs.outward("n0", chosen)] == list(nx.bfs_edges(tree, "n0"))
+    assert [(near, far) for _, near, far in graphs.order_outward("n0", chosen)] == list(nx.bfs_edges(tree, "n0"))

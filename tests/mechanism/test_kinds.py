@@ -11,24 +11,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hrsynth.errors import BadMechanism
-from hrsynth.geometry.vectors import Array, pose, unit
+from hrsynth.geometry.vectors import Array, build_pose, normalise_vector
 from hrsynth.mechanism.cameras import CameraObservation, NamedCamera, VirtualJoint
 from hrsynth.mechanism.model import JointType
 from hrsynth.mechanism.observation import Observation
-from hrsynth.mechanism.observations import kinds
+from hrsynth.mechanism.observations import list_kinds
 from hrsynth.mechanism.observations.encoder import AngleEncoder, Encoder, SlideEncoder
-from hrsynth.mechanism.screws import allowed_twists
+from hrsynth.mechanism.screws import list_allowed_twists
 from oracle import exponential
 from strategies import random_direction, random_rotation
 
 Rng = np.random.Generator
 FREEDOMS = {"R": 1, "P": 1, "U": 2, "C": 2, "S": 3}
-CHAINED = [kind for kind in kinds().values() if kind is not Encoder]
+CHAINED = [kind for kind in list_kinds().values() if kind is not Encoder]
 SEEDS = st.integers(0, 2**32 - 1).map(np.random.default_rng)
 
 
 def random_pose(rng: Rng) -> Array:
-    return pose(rng.normal(size=3), random_rotation(rng))
+    return build_pose(rng.normal(size=3), random_rotation(rng))
 
 
 def drawn(kind: type[Observation], rng: Rng, side: int = 1) -> Observation:
@@ -64,7 +64,10 @@ def chain_of(seen: Observation, X_c: Array, X: Array) -> tuple[VirtualJoint, ...
 def twists(chain: tuple[VirtualJoint, ...], wanted: Callable[[VirtualJoint], bool] = lambda _: True) -> Array:
     """The twists (6, n) of some joints of a chain, about the base's origin."""
     screws = [
-        t for joint in chain if wanted(joint) for t in allowed_twists(JointType(joint.letter), joint.at, joint.axes)
+        t
+        for joint in chain
+        if wanted(joint)
+        for t in list_allowed_twists(JointType(joint.letter), joint.at, joint.axes)
     ]
     return np.array(screws, dtype=float).reshape(-1, 6).T
 
@@ -78,7 +81,7 @@ def rates(seen: Observation, X_c: Array, X: Array) -> Array:
 
 
 def moved(X: Array, twist: Array, time: float) -> Array:
-    return pose(X[:3, 3] + time * twist[:3], exponential(time * twist[3:]) @ X[:3, :3])
+    return build_pose(X[:3, 3] + time * twist[:3], exponential(time * twist[3:]) @ X[:3, :3])
 
 
 @pytest.mark.some(6)
@@ -105,7 +108,7 @@ def test_a_chain_constrains_nothing_and_sees_what_the_kind_sees(kind: type[Obser
     """Six freedoms, independent; its passive ones are the kernel of the rates; its motors are what is measured."""
     seen, X_c, X = far(rng, kind, side)
     chain, M = chain_of(seen, X_c, X), rates(seen, X_c, X)
-    whole, passive = twists(chain), twists(chain, lambda joint: not joint.actuated)
+    whole, passive = twists(chain), twists(chain, lambda joint: not joint.is_actuated)
     assert sum(FREEDOMS[joint.letter] for joint in chain) == 6
     assert np.linalg.svd(whole, compute_uv=False)[-1] > 1e-6
     assert np.max(np.abs(M @ passive), initial=0.0) < 1e-9 * (1 + np.abs(M).max()) * (1 + np.abs(passive).max())
@@ -122,7 +125,7 @@ def test_wrenches_are_reciprocal_to_what_moves_when_the_value_is_held(
     """And they are as many as are independent: they span the same space as the rates do."""
     seen, X_c, X = far(rng, kind, side)
     W = np.array(seen.wrenches(seen.sighting(X_c, X)), dtype=float)  # type: ignore[attr-defined]
-    passive = twists(chain_of(seen, X_c, X), lambda joint: not joint.actuated)
+    passive = twists(chain_of(seen, X_c, X), lambda joint: not joint.is_actuated)
     assert np.max(np.abs(W @ passive), initial=0.0) < 1e-9 * (1 + np.abs(W).max()) * (1 + np.abs(passive).max())
     M = rates(seen, X_c, X)
     rank = np.linalg.matrix_rank
@@ -179,8 +182,8 @@ def test_the_same_is_measured_where_links_become_parts_of_others(kind: type[Obse
             "l",
             "j",
             a,
-            unit(np.cross(a, [1, 2, 3])),
-            unit(np.cross(a, [3, 1, 2])),  # type: ignore[call-arg]
+            normalise_vector(np.cross(a, [1, 2, 3])),
+            normalise_vector(np.cross(a, [3, 1, 2])),  # type: ignore[call-arg]
             seen_from="c",
         )
     )
@@ -196,21 +199,21 @@ def test_the_same_is_measured_where_links_become_parts_of_others(kind: type[Obse
 def test_a_circle_seen_from_its_axis_or_edge_on_shows_less() -> None:
     """There its chain still has five motors: the image loses two freedoms, not the chain."""
     rng = np.random.default_rng(1)
-    kind = kinds()["image_circle"]
-    X, X_c = pose(), pose((0, 0, -1.0), random_rotation(rng))
+    kind = list_kinds()["image_circle"]
+    X, X_c = build_pose(), build_pose((0, 0, -1.0), random_rotation(rng))
     seen = kind("p", "l", at=np.zeros(3), axis=np.array([0, 0, 1.0]), radius=0.2)  # type: ignore[call-arg]
     assert np.linalg.matrix_rank(rates(seen, X_c, X), tol=1e-8) == 3
-    edge_on, aside = (pose(centre, X_c[:3, :3]) for centre in ((0.8, 0.6, 0), (0.1, 0, -1.0)))
+    edge_on, aside = (build_pose(centre, X_c[:3, :3]) for centre in ((0.8, 0.6, 0), (0.1, 0, -1.0)))
     assert np.linalg.matrix_rank(rates(seen, edge_on, X), tol=1e-8) == 2
     assert np.linalg.matrix_rank(rates(seen, aside, X), tol=1e-8) == 5
 
 
 def test_a_line_through_the_centre_has_a_chain_of_other_motors() -> None:
-    kind = kinds()["line"]
+    kind = list_kinds()["line"]
     seen = kind("p", "l", at=np.array([0, 0, 1.0]), axis=np.array([0, 0, 1.0]))  # type: ignore[call-arg]
-    X_c, X = pose(), pose()
+    X_c, X = build_pose(), build_pose()
     chain = chain_of(seen, X_c, X)
-    passive = twists(chain, lambda joint: not joint.actuated)
+    passive = twists(chain, lambda joint: not joint.is_actuated)
     assert [joint.letter for joint in chain] == ["P", "P", "U", "C"]
     assert np.linalg.svd(twists(chain), compute_uv=False)[-1] > 1e-6
     assert np.max(np.abs(rates(seen, X_c, X) @ passive)) < 1e-12
@@ -230,13 +233,13 @@ def test_a_line_through_the_centre_has_a_chain_of_other_motors() -> None:
     ],
 )
 def test_what_has_no_rate_in_the_centre_is_refused(kind: str, geometry: dict[str, object]) -> None:
-    seen = kinds()[kind]("p", "l", **geometry)
+    seen = list_kinds()[kind]("p", "l", **geometry)
     with pytest.raises(BadMechanism, match=f"^{kind} 'p'|^circle 'p'"):
-        chain_of(seen, pose(), pose())
+        chain_of(seen, build_pose(), build_pose())
 
 
 def test_every_file_is_a_kind_of_its_own() -> None:
-    found = kinds()
+    found = list_kinds()
     assert len(found) == 13
     assert all(
         word == kind.kind and kind.words and set(kind.needs) <= {"at", "axis", "axis?", "radius", "joint"}

@@ -14,13 +14,13 @@ from hrsynth.errors import BadMechanism, BadRequest, BadRobotFile
 from hrsynth.mechanism import Direction, Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.legs import LegDecomposition, decompose
-from hrsynth.mechanism.normal import normal_form
-from hrsynth.mechanism.sensors import default_observation, observation_of
+from hrsynth.mechanism.normal import reduce_to_normal_form
+from hrsynth.mechanism.sensors import choose_default_segment, observe_segment
 from oracle import Oracle
 
 
 def anatomy(name: str) -> LegDecomposition:
-    return decompose(normal_form(load(name)).mechanism)
+    return decompose(reduce_to_normal_form(load(name)).mechanism)
 
 
 @pytest.mark.parametrize(
@@ -51,7 +51,7 @@ def test_legs_share_no_link_and_end_on_the_platform(name: str) -> None:
 def test_default_segments_have_a_direction_from_base_to_platform(name: str) -> None:
     found = anatomy(name)
     for leg in found.legs:
-        observation = default_observation(found, leg)
+        observation = choose_default_segment(found, leg)
         assert observation.leg == leg.label
         assert np.isclose(np.linalg.norm(observation.direction), 1.0)
         assert found.leg_of(observation.link) == leg
@@ -59,13 +59,13 @@ def test_default_segments_have_a_direction_from_base_to_platform(name: str) -> N
 
 def test_the_default_segment_is_the_rod_or_the_sliding_axis() -> None:
     robot = anatomy("gough_stewart")
-    direction = default_observation(robot, robot.legs[0])
+    direction = choose_default_segment(robot, robot.legs[0])
     slide = robot.mechanism.joints["slide_1"]
     u = robot.mechanism.links[direction.link].pose[:3, :3] @ direction.direction
     assert np.allclose(np.cross(u, slide.axis), 0)
     assert u[2] > 0
     robot = anatomy("delta")
-    first = default_observation(robot, robot.legs[0])
+    first = choose_default_segment(robot, robot.legs[0])
     rod = robot.mechanism.joints_of(first.link)
     along = rod[1].point - rod[0].point
     u = robot.mechanism.links[first.link].pose[:3, :3] @ first.direction
@@ -103,7 +103,7 @@ def test_that_a_platform_turns_is_written_and_read(tmp_path: Path, ending: str) 
 
 
 def test_a_point_platform_with_its_frame_elsewhere_is_the_same_point() -> None:
-    robot = normal_form(load("prrrp_parallel_point")).mechanism
+    robot = reduce_to_normal_form(load("prrrp_parallel_point")).mechanism
     frame = robot.links["platform"].pose.copy()
     frame[:3, 3] += (0.1, 0.05, 0.02)
     moved = robot.changed(links=[replace(robot.links["platform"], pose=frame)])
@@ -114,7 +114,7 @@ def test_a_point_platform_with_its_frame_elsewhere_is_the_same_point() -> None:
 def test_names_do_not_matter(name: str) -> None:
     robot = load(name)
     other = strategies.renamed(robot, np.random.default_rng(3))
-    assert decompose(normal_form(other).mechanism).architecture() == anatomy(name).architecture()
+    assert decompose(reduce_to_normal_form(other).mechanism).architecture() == anatomy(name).architecture()
 
 
 def watched(*observations: tuple[str, str]) -> Mechanism:
@@ -155,9 +155,9 @@ def test_a_segment_without_length_and_a_link_outside_the_legs_are_refused() -> N
         b.joint(f"tip_{i}", "S", f"rod_{i}", "plate", at=(i, i * i, 0 if i == 0 else 1), loop=i > 0)
     found = decompose(b.build("plate"))
     with pytest.raises(BadRequest, match="length of the observed segment"):
-        default_observation(found, found.legs[0])
+        choose_default_segment(found, found.legs[0])
     with pytest.raises(BadRequest, match="link not in a leg"):
-        observation_of(found, "plate")
+        observe_segment(found, "plate")
 
 
 def test_a_platform_that_no_leg_reaches_is_refused() -> None:

@@ -10,7 +10,7 @@ from hrsynth.description import list_robots, load
 from hrsynth.errors import BadMechanism
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
-from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.normal import reduce_to_normal_form
 
 
 def chain(*joints: tuple[str, tuple[float, ...], tuple[float, ...]], motors: tuple[int, ...] = ()) -> Mechanism:
@@ -27,7 +27,7 @@ def chain(*joints: tuple[str, tuple[float, ...], tuple[float, ...]], motors: tup
 
 def types(mechanism: Mechanism) -> str:
     """The joint types that are left, the loop's S apart."""
-    joints = normal_form(mechanism).mechanism.joints
+    joints = reduce_to_normal_form(mechanism).mechanism.joints
     return "".join(joint.type.value for name, joint in joints.items() if name != "loop")
 
 
@@ -68,7 +68,7 @@ def test_merging_goes_by_geometry(joints: list, expected: str) -> None:
 )
 def test_what_merging_moves_is_told(joints: list, moved: float) -> None:
     """Of a chain about the origin: the sum of how far each axis is from the joint that takes its place."""
-    found = normal_form(chain(*joints)).moved
+    found = reduce_to_normal_form(chain(*joints)).moved
     assert moved - 1e-15 <= found <= 2 * moved + 1e-15
 
 
@@ -81,9 +81,9 @@ def test_observed_links_cameras_and_platforms_never_disappear() -> None:
     from dataclasses import replace
 
     mechanism = chain(("R", AT, X), ("R", AT, Y))
-    assert "link_1" not in normal_form(mechanism).mechanism.links
+    assert "link_1" not in reduce_to_normal_form(mechanism).mechanism.links
     for kept in (replace(mechanism, camera="link_1"), replace(mechanism, platform="link_1")):
-        assert "link_1" in normal_form(kept).mechanism.links
+        assert "link_1" in reduce_to_normal_form(kept).mechanism.links
 
 
 def test_a_platform_fixed_to_the_base_is_refused() -> None:
@@ -92,19 +92,19 @@ def test_a_platform_fixed_to_the_base_is_refused() -> None:
     b.link("plate", at=(0, 0, 1))
     b.joint("weld", "F", "base", "plate")
     with pytest.raises(BadMechanism, match="fixed to the base"):
-        normal_form(b.build("plate"))
+        reduce_to_normal_form(b.build("plate"))
 
 
 @pytest.mark.some(16)
 @pytest.mark.parametrize("name", list_robots())
 def test_what_is_split_comes_together_again(name: str) -> None:
-    robot = normal_form(load(name)).mechanism
-    parts = normal_form(strategies.split(load(name), np.random.default_rng(0))).mechanism
+    robot = reduce_to_normal_form(load(name)).mechanism
+    parts = reduce_to_normal_form(strategies.split(load(name), np.random.default_rng(0))).mechanism
     assert sorted(j.type.value for j in parts.joints.values()) == sorted(j.type.value for j in robot.joints.values())
     assert len(parts.links) == len(robot.links)
 
 
 @pytest.mark.parametrize("name", list_robots())
 def test_a_normal_form_is_its_own(name: str) -> None:
-    once = normal_form(load(name)).mechanism
-    assert normal_form(once).mechanism.differences(once) == []
+    once = reduce_to_normal_form(load(name)).mechanism
+    assert reduce_to_normal_form(once).mechanism.differences(once) == []

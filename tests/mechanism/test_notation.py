@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hrsynth.description import list_robots, load
 from hrsynth.errors import BadRequest
 from hrsynth.mechanism.legs import decompose
-from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.normal import reduce_to_normal_form
 from hrsynth.mechanism.notation import Architecture, Letter, Style, Word, parse
 
 KNOWN = (
@@ -69,6 +69,6 @@ def test_what_is_no_architecture_is_refused_with_its_place(text: str) -> None:
 def test_every_shipped_robot_prints_the_architecture_of_its_table(name: str) -> None:
     from hrsynth.families.table import ROBOTS
 
-    architecture = decompose(normal_form(load(name)).mechanism).architecture()
+    architecture = decompose(reduce_to_normal_form(load(name)).mechanism).architecture()
     assert architecture.ascii == next(robot.architecture for robot in ROBOTS if robot.name == name)
     assert parse(architecture.ascii) == architecture

@@ -8,16 +8,16 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from hrsynth.analysis.advice import candidates
+from hrsynth.analysis.advice import list_candidates
 from hrsynth.description import load
-from hrsynth.geometry.vectors import Array, perpendicular, pose, unit
+from hrsynth.geometry.vectors import Array, build_pose, find_perpendicular, normalise_vector
 from hrsynth.kinematics.configuration import ClosedConfiguration, measure
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism import Direction, Joint, JointType, Observation
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.observations.encoder import AngleEncoder, SlideEncoder
 from hrsynth.mechanism.observations.line import SpaceLine
-from hrsynth.mechanism.sensors import encoders, observed_line
+from hrsynth.mechanism.sensors import locate_observed_line, make_encoders
 from kinematics.robots import ROBOTS, setting_of, walked
 from oracle import exponential
 from strategies import random_direction, random_rotation, split
@@ -28,22 +28,22 @@ STEP = 1e-5
 def kinds(rng: np.random.Generator) -> list[Observation]:
     """One observation of each class, with random geometry."""
     (u, a, m), p = (random_direction(rng) for _ in range(3)), rng.normal(size=3)
-    start = random_rotation(rng) @ perpendicular(a)
+    start = random_rotation(rng) @ find_perpendicular(a)
     return [
         Direction("1", "l", u),
         SpaceLine("1", "l", at=p, axis=u),
         AngleEncoder("1", "l", "j", a, m, rng.normal(size=3), seen_from="c"),
-        AngleEncoder("1", "l", "j", a, perpendicular(a), start, seen_from="c"),
+        AngleEncoder("1", "l", "j", a, find_perpendicular(a), start, seen_from="c"),
         SlideEncoder("1", "l", "j", a, p, m, seen_from="c"),
     ]
 
 
 def random_pose(rng: np.random.Generator) -> Array:
-    return pose(rng.normal(size=3), random_rotation(rng))
+    return build_pose(rng.normal(size=3), random_rotation(rng))
 
 
 def moved(X: Array, twist: Array, time: float) -> Array:
-    return pose(X[:3, 3] + time * twist[:3], exponential(time * twist[3:]) @ X[:3, :3])
+    return build_pose(X[:3, 3] + time * twist[:3], exponential(time * twist[3:]) @ X[:3, :3])
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -75,7 +75,7 @@ def test_together_is_one_by_one(seed: int) -> None:
 def test_every_kind_has_a_key_of_its_own() -> None:
     for robot in ROBOTS:
         setup = setting_of(robot)
-        keys = [o.key for o in setup.observed] + [each.observation.key for each in candidates(setup)]
+        keys = [o.key for o in setup.observed] + [each.observation.key for each in list_candidates(setup)]
         assert len(set(keys)) == len(keys)
 
 
@@ -94,7 +94,7 @@ def test_encoders_read_the_coordinates_of_the_twin(robot: str, cut: str) -> None
     travelled = pin.difference(model.model, model.q0, at.q)
     number = 0
     for joint in mechanism.joints.values():
-        found = encoders(mechanism, joint)
+        found = make_encoders(mechanism, joint)
         assert len(found) == (0 if joint.type in ("S", "E", "F", "6") else joint.type.freedoms)
         if not found:
             continue
@@ -115,14 +115,14 @@ def test_encoders_of_each_type_in_a_tilted_chain(type: str) -> None:
     builder.link("a", rng.normal(size=3), random_rotation(rng))
     builder.link("b", rng.normal(size=3), random_rotation(rng))
     first = random_direction(rng)
-    second = unit(first + 2 * random_direction(rng))
+    second = normalise_vector(first + 2 * random_direction(rng))
     builder.joint("turn", "S", "base", "a", rng.normal(size=3))
     builder.joint("j", type, "a", "b", rng.normal(size=3), axis=first, axis2=second if type == "U" else None)
     mechanism = builder.build(platform="b")
     for each in (mechanism, mechanism.changed(joints=[mechanism.joints["j"].turned()])):
         model = PinocchioModel(each)
         q = model.integrate(model.q0, rng.uniform(-1, 1, size=model.nv))
-        found = encoders(each, each.joints["j"])
+        found = make_encoders(each, each.joints["j"])
         _, _, values, rates = measure(model, q, "base", found)
         travelled = pin.difference(model.model, model.q0, q)
         places = model.coordinates["j"]
@@ -138,13 +138,13 @@ def test_rates_and_values_of_candidates_have_the_same_units(robot: str) -> None:
     lengths are relative to the twin's own."""
     setup = setting_of(robot, ("1",))
     mechanism = setup.mechanism
-    observations = [each.observation for each in candidates(setup)]
+    observations = [each.observation for each in list_candidates(setup)]
     rng = np.random.default_rng(5)
     q_step = rng.normal(size=PinocchioModel(mechanism).nv)
     found = []
     for length in (mechanism.length, 1.0):
         model = PinocchioModel(mechanism, length)
-        slides = [i for j in mechanism.joints.values() if j.type.slides for i in model.coordinates[j.name][:1]]
+        slides = [i for j in mechanism.joints.values() if j.type.has_translation for i in model.coordinates[j.name][:1]]
         step = q_step.copy()
         step[slides] /= length
         q = model.integrate(model.q0, 0.1 * step)
@@ -163,7 +163,7 @@ def test_rates_and_values_of_candidates_have_the_same_units(robot: str) -> None:
 def test_what_is_measured_does_not_depend_on_what_else_is_asked(robot: str) -> None:
     """Each candidate alone, and all together with poses of no link, of one and of all (of one twice)."""
     mechanism = setting_of(robot, ("1",)).mechanism
-    observations = [each.observation for each in candidates(setting_of(robot, ("1",)))]
+    observations = [each.observation for each in list_candidates(setting_of(robot, ("1",)))]
     assert {each.turns_only for each in observations} == {True, False}
     q = walked(PinocchioModel(mechanism)).q
     alone = [measure(PinocchioModel(mechanism), q, mechanism.reference, [each]) for each in observations]
@@ -190,7 +190,7 @@ def test_a_split_universal_joint_has_the_encoders_of_its_halves() -> None:
     rows = []
     for mechanism, names in ((whole, [gone]), (halves, parts)):
         model = PinocchioModel(mechanism, whole.length)
-        found = [each for name in names for each in encoders(mechanism, mechanism.joints[name])]
+        found = [each for name in names for each in make_encoders(mechanism, mechanism.joints[name])]
         assert len(found) == 2
         _, V, _, rates = measure(model, model.q0, mechanism.reference, found, tuple(whole.links))
         kernel, _ = ClosedConfiguration.of(model, model.q0).kernel()
@@ -221,7 +221,7 @@ def test_with_its_direction_a_moment_tells_the_same_about_any_origin(seed: int) 
     rng = np.random.default_rng(seed)
     X_c, X, V_c, V = random_pose(rng), random_pose(rng), rng.normal(size=(6, 12)), rng.normal(size=(6, 12))
     o = rng.normal(size=3)
-    X_o = X_c @ pose(o)
+    X_o = X_c @ build_pose(o)
     V_o = np.vstack([V_c[:3] + np.cross(V_c[3:].T, X_c[:3, :3] @ o).T, V_c[3:]])
     u, p = random_direction(rng), rng.normal(size=3)
     seen, line = Direction("1", "l", u), SpaceLine("1", "l", at=p, axis=u)
@@ -241,12 +241,12 @@ def test_an_observed_line_is_that_of_the_segment(robot: str) -> None:
     mechanism = setup.mechanism
     for seen in setup.observed:
         assert isinstance(seen, Direction)
-        line = observed_line(setup.decomposition, seen)
+        line = locate_observed_line(setup.decomposition, seen)
         assert line.key != seen.key
         X = mechanism.links[seen.link].pose
         u, p = X[:3, :3] @ line.axis, X[:3, :3] @ line.at + X[:3, 3]
         np.testing.assert_allclose(line.axis, seen.direction)
-        still = [j for j in mechanism.joints_of(seen.link) if not j.type.slides]
+        still = [j for j in mechanism.joints_of(seen.link) if not j.type.has_translation]
         assert len(still) > 0
         for joint in still:
             assert gap(joint, p, u) < 1e-7 * mechanism.length
@@ -265,4 +265,4 @@ def test_a_line_keeps_the_link_it_is_seen_from() -> None:
     setup = setting_of("delta")
     seen = replace(setup.observed[0], seen_from="platform")
     assert isinstance(seen, Direction)
-    assert observed_line(setup.decomposition, seen).seen_from == "platform"
+    assert locate_observed_line(setup.decomposition, seen).seen_from == "platform"

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hrsynth.errors import BadRequest
-from hrsynth.geometry.vectors import pose, rotation_from_rpy
-from hrsynth.mechanism.pose import Grid, Pose, asked_poses
+from hrsynth.geometry.vectors import build_pose, convert_rpy_to_rotation
+from hrsynth.mechanism.pose import Grid, Pose, parse_poses
 from oracle import exponential
 
 numbers = st.floats(-5, 5).map(lambda value: round(value, 4) + 0.0)
@@ -88,15 +88,15 @@ def test_a_pose_reads_as_it_prints(given_pose: Pose, rpy: tuple[float, float, fl
 )
 def test_back_from_a_matrix(vector: np.ndarray) -> None:
     R = exponential(np.asarray(vector, dtype=float))
-    found = Pose.of(pose([0.1, -0.2, 0.3], R))
+    found = Pose.of(build_pose([0.1, -0.2, 0.3], R))
     assert (found.x, found.y, found.z) == (0.1, -0.2, 0.3)
-    np.testing.assert_allclose(rotation_from_rpy(*found.rpy), R, atol=1e-12)
+    np.testing.assert_allclose(convert_rpy_to_rotation(*found.rpy), R, atol=1e-12)
     np.testing.assert_allclose(found.rotation, R, atol=1e-12)
 
 
 def test_a_point_has_no_turn() -> None:
     R = exponential(np.array([0.0, 0.0, pi / 2]))
-    found = Pose.of(pose([1, 2, 3], R), np.array([0.5, 0, 0]))
+    found = Pose.of(build_pose([1, 2, 3], R), np.array([0.5, 0, 0]))
     assert found.rpy is None
     assert (found.x, found.y, found.z) == pytest.approx((1, 2.5, 3))
 
@@ -139,4 +139,4 @@ def test_what_is_refused_of_a_grid(text: str, what: str) -> None:
 def test_bytes_are_no_pose(given: object) -> None:
     """Their numbers are letters."""
     with pytest.raises(BadRequest, match="a pose"):
-        asked_poses(given)
+        parse_poses(given)

@@ -11,12 +11,12 @@ import pytest
 
 from hrsynth.description import list_robots, load
 from hrsynth.geometry.incidences import Incidence
-from hrsynth.geometry.vectors import Array, inverse, unit
+from hrsynth.geometry.vectors import Array, invert_pose, normalise_vector
 from hrsynth.mechanism import Direction, Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.incidences import Incidences
-from hrsynth.mechanism.normal import normal_form
-from hrsynth.mechanism.screws import constraints
+from hrsynth.mechanism.normal import reduce_to_normal_form
+from hrsynth.mechanism.screws import build_constraint_matrix
 from mechanism.relating import observed, recognised, segments, walked
 from oracle import Oracle
 from strategies import deltas, planar, pods, random_rotation, spherical, transformed
@@ -29,7 +29,7 @@ class Here:
 
     def __init__(self, mechanism: Mechanism, relations: Incidences, state: Array) -> None:
         self.mechanism = mechanism
-        moved = {name: state[i] @ inverse(link.pose) for i, (name, link) in enumerate(mechanism.links.items())}
+        moved = {name: state[i] @ invert_pose(link.pose) for i, (name, link) in enumerate(mechanism.links.items())}
         self.classes: dict[int, list[Array]] = {}
         self.centres: dict[int, Array] = {}
         self.seen = []
@@ -64,7 +64,7 @@ class Here:
                 along = self.centres[k] - self.centres[j]
                 for c in sight.classes:
                     along = along - axis[c] * (axis[c] @ along)
-                yield float(np.linalg.norm(np.cross(unit(along), u)))
+                yield float(np.linalg.norm(np.cross(normalise_vector(along), u)))
 
     def _miss(self, incidence: Incidence, axis: dict[int, Array]) -> float:
         vector = sum((sign * self.centres[number] for number, sign in incidence.terms), np.zeros(3))
@@ -92,11 +92,11 @@ def test_relations_hold_wherever_the_robot_goes(name: str) -> None:
 @pytest.mark.parametrize("name", list_robots())
 def test_the_constraints_in_screws_are_those_of_the_oracle(name: str) -> None:
     """The kernel of A, built from centres and axes where the robot is, is T_qC."""
-    robot = normal_form(load(name)).mechanism
+    robot = reduce_to_normal_form(load(name)).mechanism
     oracle, state = Oracle(robot), walked(robot, 1, seed=3)[-1]
-    moved = {link: state[i] @ inverse(robot.links[link].pose) for i, link in enumerate(robot.links)}
+    moved = {link: state[i] @ invert_pose(robot.links[link].pose) for i, link in enumerate(robot.links)}
     place = {link: i for i, link in enumerate(n for n in robot.links if n != robot.base)}
-    A = constraints(
+    A = build_constraint_matrix(
         list(robot.joints.values()),
         place,
         lambda joint: (

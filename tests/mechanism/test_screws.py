@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hrsynth.mechanism.model import JointType
-from hrsynth.mechanism.screws import allowed_twists, transmitted_wrenches
+from hrsynth.mechanism.screws import list_allowed_twists, list_transmitted_wrenches
 
 
 @pytest.mark.parametrize("kind", list(JointType))
@@ -17,7 +17,7 @@ def test_what_a_joint_allows_is_reciprocal_to_all_that_it_transmits(kind: JointT
     point, *axes = (np.array([Fraction(int(x)) for x in rng.integers(-9, 10, 3)], dtype=object) for _ in range(3))
     twists, wrenches = (
         np.array(each(kind, point, axes if kind is JointType.UNIVERSAL else axes[:1]), dtype=object).reshape(-1, 6)
-        for each in (allowed_twists, transmitted_wrenches)
+        for each in (list_allowed_twists, list_transmitted_wrenches)
     )
     assert len(twists) == kind.freedoms == 6 - len(wrenches)
     assert not (twists @ wrenches.T).any()

@@ -17,24 +17,24 @@ from hrsynth.description import list_robots, load
 from hrsynth.errors import BadRequest
 from hrsynth.mechanism import JointType, Mechanism
 from hrsynth.mechanism.legs import decompose
-from hrsynth.mechanism.normal import normal_form
-from hrsynth.mechanism.sensors import default_observation
+from hrsynth.mechanism.normal import reduce_to_normal_form
+from hrsynth.mechanism.sensors import choose_default_segment
 from hrsynth.present.drawings import svg
 from hrsynth.present.drawings.plan import Layout, plan
-from hrsynth.present.drawings.schematic import leg_svg, robot_svg
+from hrsynth.present.drawings.schematic import draw_leg_svg, draw_robot_svg
 
 FEW = ("rrrrr_m1", "quattro", "uranesx")
 
 
 def real(name: str) -> tuple[Mechanism, set[str]]:
     """A robot in normal form and the links of its default observations."""
-    mechanism = normal_form(load(name)).mechanism
+    mechanism = reduce_to_normal_form(load(name)).mechanism
     decomposition = decompose(mechanism)
-    return mechanism, {default_observation(decomposition, leg).link for leg in decomposition.legs}
+    return mechanism, {choose_default_segment(decomposition, leg).link for leg in decomposition.legs}
 
 
 def driven(mechanism: Mechanism) -> set[str]:
-    return {joint.name for joint in mechanism.joints.values() if joint.actuated}
+    return {joint.name for joint in mechanism.joints.values() if joint.is_actuated}
 
 
 def read(text: str) -> Any:
@@ -102,7 +102,7 @@ def assert_free(found: Layout) -> None:
 @pytest.mark.parametrize("name", list_robots())
 def test_every_joint_of_a_robot_stands_once_and_motors_are_marked(name: str) -> None:
     mechanism, observed = real(name)
-    assert_whole(robot_svg(mechanism, observed=observed), mechanism, observed, set())
+    assert_whole(draw_robot_svg(mechanism, observed=observed), mechanism, observed, set())
     assert_free(plan(mechanism, observed=observed))
 
 
@@ -117,14 +117,14 @@ def test_virtual_actuators_of_hidden_robots_are_coloured(name: str, form: str) -
         assert name.startswith("3ppr")
         return
     observed, virtual = {o.link for o in hidden.observations}, driven(hidden)
-    assert_whole(robot_svg(hidden, virtual=virtual), hidden, observed, virtual)
+    assert_whole(draw_robot_svg(hidden, virtual=virtual), hidden, observed, virtual)
     assert_free(plan(hidden, virtual=virtual))
 
 
 @settings(max_examples=60, deadline=None)
 @given(strategies.mechanisms())
 def test_any_mechanism_can_be_drawn(mechanism: Mechanism) -> None:
-    assert_whole(robot_svg(mechanism, observed=()), mechanism, set(), set())
+    assert_whole(draw_robot_svg(mechanism, observed=()), mechanism, set(), set())
     assert_free(plan(mechanism, observed=()))
 
 
@@ -132,9 +132,9 @@ def test_any_mechanism_can_be_drawn(mechanism: Mechanism) -> None:
 def test_a_leg_alone_holds_its_own_joints(name: str) -> None:
     mechanism, observed = real(name)
     for leg in decompose(mechanism).legs:
-        assert sorted(joints_in(read(leg_svg(mechanism, leg.label, observed=observed)))) == sorted(leg.joints)
+        assert sorted(joints_in(read(draw_leg_svg(mechanism, leg.label, observed=observed)))) == sorted(leg.joints)
     with pytest.raises(BadRequest, match="no leg"):
-        leg_svg(mechanism, "9")
+        draw_leg_svg(mechanism, "9")
 
 
 @pytest.mark.parametrize("name", ["quattro", "gough_stewart", "orthoglide"])
@@ -168,7 +168,7 @@ def test_what_is_in_no_leg_makes_one_group_of_all() -> None:
     slide = next(j for j in mechanism.joints.values() if one in j.links)
     bridge = type(slide)("bridge", JointType.SPHERICAL, one, two, slide.point)
     bridged = mechanism.changed(joints=[bridge])
-    assert_whole(robot_svg(bridged, observed=()), bridged, set(), set())
+    assert_whole(draw_robot_svg(bridged, observed=()), bridged, set(), set())
     assert_free(plan(bridged, observed=()))
 
 
@@ -177,5 +177,5 @@ def test_virtual_chains_from_a_camera_on_a_leg_are_told_apart() -> None:
     assert hidden is not None
     found = plan(hidden, virtual=driven(hidden))
     assert [row.label for row in found.rows] == [None]
-    assert_whole(robot_svg(hidden, virtual=driven(hidden)), hidden, {"rod_1a", "rod_2a"}, driven(hidden))
+    assert_whole(draw_robot_svg(hidden, virtual=driven(hidden)), hidden, {"rod_1a", "rod_2a"}, driven(hidden))
     assert_free(found)

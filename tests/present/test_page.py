@@ -57,7 +57,7 @@ def push(tab: Tab, number: int, key: str, times: int = 4) -> None:
 @pytest.mark.parametrize("name", FIVE)
 def test_the_page_of_a_robot_shows_it_and_its_sliders_move_it(name: str, tab: Tab, tmp_path: Path):
     file = tmp_path / "view.html"
-    file.write_bytes(page.static(seen(name)))
+    file.write_bytes(page.render_static_page(seen(name)))
     tab.page.set_viewport_size(SIZE)
     tab.open(file, READY)
     home = drawn(tab)
@@ -80,7 +80,7 @@ def test_the_page_of_a_robot_shows_it_and_its_sliders_move_it(name: str, tab: Ta
 @pytest.mark.browser
 def test_either_robot_is_shown_alone_or_both_with_the_other_modes(tab: Tab, tmp_path: Path):
     file = tmp_path / "view.html"
-    file.write_bytes(page.static(seen("quattro")))
+    file.write_bytes(page.render_static_page(seen("quattro")))
     tab.page.set_viewport_size(SIZE)
     tab.open(file, READY)
     before = drawn(tab)
@@ -98,7 +98,7 @@ def test_either_robot_is_shown_alone_or_both_with_the_other_modes(tab: Tab, tmp_
 @pytest.mark.browser
 def test_the_panel_says_what_is_shown_and_fits_a_narrow_window(tab: Tab, tmp_path: Path):
     file = tmp_path / "view.html"
-    file.write_bytes(page.static(seen("uranesx")))
+    file.write_bytes(page.render_static_page(seen("uranesx")))
     tab.page.set_viewport_size(SIZE)
     tab.open(file, READY)
     text = tab.page.locator("body").inner_text()
@@ -141,7 +141,7 @@ def test_with_a_server_sliders_move_the_robot_together(address: str, tab: Tab):
 
 
 def test_the_page_is_whole_and_asks_for_nothing():
-    text = page.page(seen("rrrrr_m1"))
+    text = page.render_saved_page(seen("rrrrr_m1"))
     outside = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
     assert not re.search(r"(src|href)\s*=\s*[\"'](?!data:|#)", outside)
     assert text.count("<script") == 3
@@ -154,7 +154,7 @@ def test_a_name_cannot_break_the_page():
 
     found = seen("rrrrr_m1")
     robot = replace(found.setup.robot, name="</script><b>&")
-    text = page.page(replace(found, setup=replace(found.setup, robot=robot), notes=("</script><b>",)))
+    text = page.render_saved_page(replace(found, setup=replace(found.setup, robot=robot), notes=("</script><b>",)))
     assert "</script><b>" not in text
     assert text.count("</script>") == 3
 

@@ -15,9 +15,9 @@ from matplotlib.text import Text
 import hrsynth
 from hrsynth.families.__main__ import main
 from hrsynth.present import figure_format as papers
-from hrsynth.present.figure_format import Paper, paper_for, scale_figure
+from hrsynth.present.figure_format import Paper, choose_paper, scale_figure
 from hrsynth.present.outputs import OUTPUTS
-from hrsynth.present.plots import empty_figure
+from hrsynth.present.plots import make_empty_figure
 from hrsynth.present.sketch import Sketch
 from hrsynth.results import Result
 
@@ -115,7 +115,7 @@ def test_text_is_legible_on_the_page_and_apart_at_any_width(name: str, folder: s
     for given in ASKED:
         figure, texts = drawn(found, given)
         width, height = figure.get_size_inches() * figure.dpi
-        paper = paper_for(".png", *given)
+        paper = choose_paper(".png", *given)
         assert len(texts) >= 3
         smallest = min(texts, key=lambda each: each.get_fontsize())
         least = SMALLEST * (1.0 if paper.size is None else paper.size / papers.PRINTED)
@@ -156,9 +156,9 @@ def test_a_size_alone_scales_the_whole_figure():
     ],
 )
 def test_lines_break_at_spaces_into_like_parts_and_keep_numbers_with_their_units(whole: str):
-    from hrsynth.present.plots import empty_figure
+    from hrsynth.present.plots import make_empty_figure
 
-    figure = empty_figure(4, 4)
+    figure = make_empty_figure(4, 4)
     for width in (3.0, 2.0, 1.5, 1.0):
         text = figure.text(0.5, 0.5, whole)
         papers.wrap(text, width)
@@ -171,7 +171,7 @@ def test_lines_break_at_spaces_into_like_parts_and_keep_numbers_with_their_units
 @pytest.mark.parametrize("scale", [1.0, 0.6])
 @pytest.mark.parametrize("extent", [(1, 1, 1), (1, 0.3, 3), (4, 2, 0.5)])
 def test_names_of_axes_in_space_are_beside_their_scales(extent: tuple[float, float, float], scale: float):
-    figure = empty_figure(6, 6)
+    figure = make_empty_figure(6, 6)
     place = Sketch.of(None, np.zeros((1, 3)), []).place(figure, (0.1, 0.1, 0.8, 0.8), np.array([(0, 0, 0), extent]))
     scale_figure(figure, list({id(each): each for each in figure.findobj()}.values()), scale)
     figure.draw_without_rendering()

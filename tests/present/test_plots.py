@@ -14,9 +14,9 @@ from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load
 from hrsynth.mechanism.pose import Pose
 from hrsynth.present import maps, palette, plots
-from hrsynth.present.figure_format import PNG, print_figure, settle
-from hrsynth.present.plots import MapPlane, round_ticks, tick_words
-from hrsynth.present.view.view import plane_normal
+from hrsynth.present.figure_format import PNG, print_figure, wrap_labels
+from hrsynth.present.plots import MapPlane, format_ticks, round_ticks
+from hrsynth.present.view.view import find_plane_normal
 from strategies import random_rotation, transformed
 
 PRESENT = Path(hrsynth.__file__).parent / "present"
@@ -31,7 +31,7 @@ def test_ticks_are_round_inside_the_scale_and_neither_few_nor_many(seed: int):
     assert 2 <= len(ticks) <= 10
     assert np.all((ticks >= low * (1 - 1e-9)) & (ticks <= high * (1 + 1e-9)))
     assert np.all(np.diff(ticks) > 0)
-    for tick, words in zip(ticks, tick_words(ticks), strict=True):
+    for tick, words in zip(ticks, format_ticks(ticks), strict=True):
         assert float(words) == pytest.approx(tick, rel=1e-2)
         assert len(words.strip("0.").replace(".", "")) <= 3 or "e" in words
 
@@ -60,8 +60,8 @@ def test_notebooks_that_plot_use_it():
 
 
 def test_what_is_held_is_said_in_metres_and_degrees():
-    figure, _ = plots.panels(1, 1, 3, 3)
-    plots.heading(figure, "title", Pose(z=-0.7, phi=np.pi / 6))
+    figure, _ = plots.make_panels(1, 1, 3, 3)
+    plots.draw_heading(figure, "title", Pose(z=-0.7, phi=np.pi / 6))
     assert figure.get_suptitle() == "title\nz = -0.7 m, φ = 30°"
 
 
@@ -72,7 +72,7 @@ def test_a_tilted_plane_of_motion_is_drawn_in_true_scale(seed: int):
     rng = np.random.default_rng(seed)
     robot = transformed(load("3rrr_m1"), random_rotation(rng), rng.normal(scale=0.3, size=3))
     motion = ObservedRobot.of(robot).motion
-    normal = plane_normal(motion)
+    normal = find_plane_normal(motion)
     assert normal is not None
     names = [name for name, _ in sorted(zip("xyz", np.abs(normal), strict=True), key=lambda each: each[1])][:2]
     drawn = MapPlane.of([(name, np.linspace(0, 1, 5)) for name in names], motion, 0.1, 9)
@@ -89,7 +89,7 @@ def test_beyond_a_tilted_grid_nothing_is_said():
     rng = np.random.default_rng(3)
     motion = ObservedRobot.of(transformed(load("3rpr_m1"), random_rotation(rng), np.zeros(3))).motion
     drawn = MapPlane.of([("x", np.linspace(0, 1, 5)), ("y", np.linspace(0, 1, 5))], motion, 0.1, 9)
-    _, (place,) = plots.panels(1, 1, 3, 3)
+    _, (place,) = plots.make_panels(1, 1, 3, 3)
     drawn.cells(place, np.full((5, 5), np.nan))
     (hatched,) = [patch for patch in place.patches if patch.get_hatch()]
     corners = hatched.get_path().vertices[:4]
@@ -117,7 +117,7 @@ def test_legends_stand_beside_the_axes():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(maps, "print_figure", kept)
         found = hrsynth.check(load("3rrr_m1"), grid="x=-0.2:0.2:9,y=-0.2:0.2:9,phi=0")
-        maps.distance_map(found)
+        maps.draw_distance_map(found)
     (figure,) = drawn
     figure.savefig(io.BytesIO())
     (beside,) = figure.legends
@@ -128,12 +128,12 @@ def test_legends_stand_beside_the_axes():
 def test_a_name_is_drawn_as_it_is(name: str, recwarn: pytest.WarningsRecorder):
     @plots.in_style
     def drawn(text: str) -> bytes:
-        figure, (axes,) = plots.panels(1, 1, 16.0, 5.0)
+        figure, (axes,) = plots.make_panels(1, 1, 16.0, 5.0)
         figure.suptitle(text)
         axes.set_xlabel(text)
         axes.plot([0, 1], label=text)
         axes.legend()
-        settle(figure)
+        wrap_labels(figure)
         shown = {each.get_text() for each in (figure._suptitle, axes.xaxis.label)}
         assert {each.replace("\n", " ") for each in shown} == {text}
         return print_figure(figure, PNG)

@@ -24,7 +24,7 @@ def test_a_portrait_holds_the_robot_and_nothing_beyond_its_frame(name: str):
     assert min(at) > 0
     assert max(at) < 400
     assert root.get("role") == "img"
-    motors = sum(joint.actuated for joint in robot.joints.values())
+    motors = sum(joint.is_actuated for joint in robot.joints.values())
     assert sum(mark.role == MOTOR for mark in drawn.marks) == motors
     every = np.vstack([mark.points for mark in drawn.marks])
     for joint in robot.joints.values():

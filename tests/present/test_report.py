@@ -16,15 +16,15 @@ from lxml import etree
 
 from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.derive import Derivation, derive
-from hrsynth.cli import execute
+from hrsynth.cli import run_command
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, NoReachablePose
-from hrsynth.families.formations import formation
+from hrsynth.families.formations import build_formation
 from hrsynth.present import palette
 from hrsynth.present.drawings import svg
 from hrsynth.present.report import figures, pages, parts
 from hrsynth.present.report.answer import set_rows
-from hrsynth.present.report.formulas import collect_symbols, formula, lower_indices, underline_motors
+from hrsynth.present.report.formulas import collect_symbols, format_formula, lower_indices, underline_motors
 
 FAST = ("uranesx", None)
 SLOW = [("quattro", "1,4"), ("rrrrr_m1", None), ("3ppr_m1", None)]
@@ -43,7 +43,7 @@ def made(name: str, legs: str | None) -> tuple[Derivation, str]:
 
 
 def report(found: Derivation) -> str:
-    return pages.page(found, parts.parts(found, 0)).decode()
+    return pages.render_report(found, parts.collect_report_parts(found, 0)).decode()
 
 
 def read(page: str) -> Any:
@@ -173,7 +173,7 @@ def test_a_part_that_fails_leaves_its_reason():
     def fails() -> None:
         raise NoReachablePose("r", "the plane z=1", "too high")
 
-    assert parts.ask("r", fails) == parts.Refused("no pose of the plane z=1 is reached: too high")
+    assert parts.ask("r", fails) == parts.RefusedPart("no pose of the plane z=1 is reached: too high")
     with pytest.raises(ZeroDivisionError):
         parts.ask("r", lambda: 1 // 0)
 
@@ -211,7 +211,7 @@ def contrast(one: str, other: str) -> float:
 
 
 def colours() -> dict[str, str]:
-    return dict(re.findall(r"--(\w+): (#[0-9a-f]+);", palette.css()))
+    return dict(re.findall(r"--(\w+): (#[0-9a-f]+);", palette.format_css()))
 
 
 def rules() -> Iterator[tuple[str, str]]:
@@ -250,7 +250,7 @@ def test_letters_and_lines_of_drawings_stand_out():
     [(list(permutations((1, 2, 3), 2)), "good"), pytest.param([(1, 2), (2, 3)], "bad", marks=pytest.mark.long)],
 )
 def test_a_formation_is_as_good_in_the_table_as_in_the_headline(pairs: list[tuple[int, int]], color: str):
-    made = formation([(0, 0, 0), (1, 0.1, 0), (0.5, 0.9, 0.2)], pairs, bodies="position")
+    made = build_formation([(0, 0, 0), (1, 0.1, 0), (0.5, 0.9, 0.2)], pairs, bodies="position")
     root = read(report(derive(made)))
     (headline,) = root.xpath("//p[contains(@class, 'verdict')]")
     assert headline.get("class") == f"verdict {color}"
@@ -270,13 +270,13 @@ def test_a_formation_is_as_good_in_the_table_as_in_the_headline(pairs: list[tupl
 def test_formulas_are_mathml_without_old_elements_or_entities():
     import sympy
 
-    from hrsynth.constraints.vector_algebra import products, vector
+    from hrsynth.constraints.vector_algebra import load_products, make_vector
 
-    dot, cross, det = products()
-    a, b, n = vector("B1"), vector("tau2"), vector("n")
+    dot, cross, det = load_products()
+    a, b, n = make_vector("B1"), make_vector("tau2"), make_vector("n")
     J = sympy.MatrixSymbol("J1", 3, 3)
     for expression in (det(n, a, b) * dot(a, b) - dot(a, cross(b, n)), sympy.Determinant(J.T * J)):
-        text = formula(expression, 'said "so"')
+        text = format_formula(expression, 'said "so"')
         root = etree.fromstring(text.encode())
         known = {"math", "mrow", "mi", "mo", "mn", "msub", "msup", "msubsup"}
         assert {etree.QName(e).localname for e in root.iter()} <= known
@@ -286,10 +286,10 @@ def test_formulas_are_mathml_without_old_elements_or_entities():
 
 def test_products_keep_their_brackets():
     """Three points seen of a Gough-Stewart platform: · binds sums and products no closer than in print."""
-    from hrsynth.constraints.vector_algebra import products, vector
+    from hrsynth.constraints.vector_algebra import load_products, make_vector
 
-    dot, cross, _det = products()
-    (b1, b2, b3), (r1, r2, r3) = ([vector(f"{name}{i}") for i in (1, 2, 3)] for name in "Br")
+    dot, cross, _det = load_products()
+    (b1, b2, b3), (r1, r2, r3) = ([make_vector(f"{name}{i}") for i in (1, 2, 3)] for name in "Br")
     for expression, printed in (
         (
             dot(r1, b2 - b1) * dot(r2, b3 - b2) * dot(r3, b1 - b3)
@@ -298,7 +298,7 @@ def test_products_keep_their_brackets():
         ),
         (dot(b1, b2 - r1) ** 2 - dot(b1, cross(r1, b2)), "(B1·(B2-r1))2-B1·(r1×B2)=0"),
     ):
-        assert re.sub("<[^>]*>|\u2062", "", html.unescape(formula(expression, "said"))) == printed
+        assert re.sub("<[^>]*>|\u2062", "", html.unescape(format_formula(expression, "said"))) == printed
 
 
 def test_names_are_set_as_in_print():
@@ -336,7 +336,7 @@ def test_an_index_is_not_read_as_a_letter_of_a_name():
 
 def test_the_command_writes_a_page_and_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     page = tmp_path / "report.html"
-    assert execute(["derive", "3prp", "--report", str(page)]) == 0
+    assert run_command(["derive", "3prp", "--report", str(page)]) == 0
     assert f"The report is written to {page}." in capsys.readouterr().out
     assert read(page.read_text(encoding="utf-8")).xpath("//tr[@data-step]")
     assert [file.name for file in tmp_path.iterdir()] == ["report.html"]
@@ -346,7 +346,7 @@ def test_the_command_writes_a_page_and_says_so(tmp_path: Path, capsys: pytest.Ca
 def test_a_page_that_cannot_be_written_is_refused_at_once(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], file: str, words: str
 ):
-    assert execute(["derive", "quattro", "--report", str(tmp_path / file)]) == 2
+    assert run_command(["derive", "quattro", "--report", str(tmp_path / file)]) == 2
     said = capsys.readouterr()
     assert said.out == ""
     assert words in said.err
@@ -356,7 +356,7 @@ def test_a_page_that_cannot_be_written_is_refused_at_once(
 def test_accuracy_is_about_directions_that_see_everything():
     found = made(*FAST)[0]
     with pytest.raises(BadRequest, match="infinite"):
-        parts.error_plane(found.setup, 0)
+        parts.map_error_plane(found.setup, 0)
 
 
 @pytest.mark.long
@@ -364,7 +364,7 @@ def test_a_report_speaks_of_what_is_seen_whatever_kind_it_is(tmp_path: Path):
     """A leg and two kinds besides on a planar robot: sets, condition, modes and accuracy are of all three."""
     page = tmp_path / "report.html"
     assert (
-        execute(
+        run_command(
             [
                 "derive",
                 "3rrr_m1",

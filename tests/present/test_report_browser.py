@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from browser import Tab
-from hrsynth.cli import execute
+from hrsynth.cli import run_command
 
 pytestmark = pytest.mark.browser
 
@@ -23,7 +23,7 @@ WIDE = "document.documentElement.scrollWidth <= document.documentElement.clientW
 @pytest.mark.parametrize(("name", "legs"), FIVE, ids=[name for name, _ in FIVE])
 def test_a_report_is_shown(tab: Tab, tmp_path: Path, name: str, legs: str):
     page = tmp_path / "report.html"
-    assert execute(["derive", name, "--observe", legs, "--report", str(page)]) == 0
+    assert run_command(["derive", name, "--observe", legs, "--report", str(page)]) == 0
     tab.open(page, "document.readyState == 'complete'")
     for law in (PICTURES, DRAWN, WIDE):
         assert tab.page.evaluate(law), law
@@ -35,7 +35,7 @@ def test_a_report_is_shown(tab: Tab, tmp_path: Path, name: str, legs: str):
 
 def test_a_report_is_read_on_a_small_screen_and_on_paper(tab: Tab, tmp_path: Path):
     page = tmp_path / "report.html"
-    assert execute(["derive", "uranesx", "--report", str(page)]) == 0
+    assert run_command(["derive", "uranesx", "--report", str(page)]) == 0
     tab.page.set_viewport_size({"width": 400, "height": 800})
     tab.open(page, "document.readyState == 'complete'")
     assert tab.page.evaluate(WIDE)
@@ -53,7 +53,7 @@ PRINTED = {"width": 695, "height": 1024}
 def test_a_report_prints_on_eight_full_pages(tab: Tab, tmp_path: Path, name: str, legs: str):
     """All of it is printed, the folded parts too; so pages that the height of what is printed fills are full."""
     page = tmp_path / "report.html"
-    assert execute(["derive", name, "--observe", legs, "--report", str(page)]) == 0
+    assert run_command(["derive", name, "--observe", legs, "--report", str(page)]) == 0
     tab.page.set_viewport_size(PRINTED)
     tab.open(page, "document.readyState == 'complete'")
     tab.page.emulate_media(media="print")

@@ -14,11 +14,11 @@ import pytest
 
 import hrsynth
 from hrsynth import load
-from hrsynth.cli import app, execute
+from hrsynth.cli import app, run_command
 from hrsynth.cli.analyses import FIGURE, QUESTIONS
 from hrsynth.cli.options import JSON, SOURCE
 from hrsynth.errors import BadRequest
-from hrsynth.present.outputs import OUTPUTS, function, outputs_of
+from hrsynth.present.outputs import OUTPUTS, get_outputs, load_function
 from hrsynth.results import Result
 
 GOAL, OTHER = "x=0.05,y=0.3", "x=0.06,y=0.3"
@@ -63,7 +63,7 @@ def test_what_makes_an_output_is_there():
         names = [outputs.text]
         for file in outputs.files:
             names += [*file.makers.values(), *filter(None, (file.computed, file.nothing, *(file.installed or ())[1:]))]
-        assert all(callable(function(name)) for name in names)
+        assert all(callable(load_function(name)) for name in names)
 
 
 @pytest.mark.parametrize("question", QUESTIONS, ids=lambda question: question.name)
@@ -87,7 +87,7 @@ def test_each_option_goes_somewhere(question):
 @pytest.mark.parametrize("command", ASKED)
 def test_a_result_is_printed_as_by_the_command_line(command: str, capsys: pytest.CaptureFixture[str]):
     found = answer(command)
-    assert execute([command, "rrrrr_m1", *ASKED[command][1]]) == 0
+    assert run_command([command, "rrrrr_m1", *ASKED[command][1]]) == 0
     assert str(found) == hrsynth.text(found) == capsys.readouterr().out.rstrip("\n")
 
 
@@ -203,7 +203,7 @@ def test_an_answer_may_say_draw_and_write_itself(monkeypatch: pytest.MonkeyPatch
     """As a new question does that is declared in one module."""
     public = Result.public
     monkeypatch.setattr(Result, "public", staticmethod(lambda name: reach if name == "reach" else public(name)))
-    (file,) = outputs_of("reach").files
+    (file,) = get_outputs("reach").files
     assert hrsynth.text(Reach()) == "reaches\n1 m"
     assert hrsynth.draw(Reach()).content.startswith(b"\x89PNG")
     hrsynth.draw(Reach(), tmp_path / "reach.pdf")

@@ -31,7 +31,7 @@ STILL = (
 def open_page(tab: Tab, tmp_path: Path) -> Callable[..., Tab]:
     def opened(name: str, size: dict[str, int] = SIZE) -> Tab:
         file = tmp_path / f"{name}.html"
-        file.write_bytes(page.static(seen(name)))
+        file.write_bytes(page.render_static_page(seen(name)))
         tab.page.set_viewport_size(size)
         tab.open(file, READY)
         tab.page.evaluate(NAMES)
@@ -106,7 +106,7 @@ def test_a_finger_picks_a_leg_beside_which_it_comes_down(browser: Any, tmp_path:
     context = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True, device_scale_factor=2)
     tab = Tab.of(context.new_page())
     file = tmp_path / "page.html"
-    file.write_bytes(page.static(seen("3rrr_m1")))
+    file.write_bytes(page.render_static_page(seen("3rrr_m1")))
     tab.open(file, READY)
     ask(tab, NAMES)
     ask(tab, "stage.ghosts([]); window.told = []; stage.onpick = (...what) => told.push(what); 0")
@@ -416,7 +416,7 @@ def test_without_webgl_one_line_says_so_and_the_words_stay(tab: Tab, tmp_path: P
       HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
         return kind.startsWith("webgl") ? null : own.call(this, kind, ...more); };""")
     file = tmp_path / "page.html"
-    file.write_bytes(page.static(seen("quattro")))
+    file.write_bytes(page.render_static_page(seen("quattro")))
     tab.open(file, READY)
     ask(tab, NAMES)
     assert "WebGL" in tab.page.locator(".stage [role=alert]").inner_text()

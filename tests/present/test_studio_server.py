@@ -19,7 +19,7 @@ from hrsynth.errors import BadRequest, MissingExtra
 from hrsynth.present.studio import server as serving
 from hrsynth.present.studio import tabs, uploads
 from hrsynth.present.studio.server import StudioServer
-from hrsynth.present.studio.tabs import Opening
+from hrsynth.present.studio.tabs import StartupState
 from present.studio_client import (
     Page,
     alive,
@@ -84,7 +84,7 @@ SOCKET = [
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[StudioServer]:
-    made = StudioServer(Opening(), desk=DESK)
+    made = StudioServer(StartupState(), desk=DESK)
     yield made
     made.stop()
 
@@ -273,13 +273,13 @@ def test_it_listens_on_this_machine_alone():
 def test_a_port_that_is_taken_is_refused(server: StudioServer):
     for port in (port_of(server), 70_000, -1):
         with pytest.raises(BadRequest, match="cannot serve the page"):
-            StudioServer(Opening(), port, desk=DESK)
+            StudioServer(StartupState(), port, desk=DESK)
 
 
 def test_without_its_libraries_the_extra_is_named(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(sys.modules, "uvicorn", None)
     with pytest.raises(MissingExtra, match=re.escape('pip install "hrsynth[studio]"')):
-        StudioServer(Opening(), desk=DESK)
+        StudioServer(StartupState(), desk=DESK)
 
 
 def test_two_tabs_have_processes_and_files_of_their_own(server: StudioServer):
@@ -298,7 +298,7 @@ def test_two_tabs_have_processes_and_files_of_their_own(server: StudioServer):
 
 
 def test_more_tabs_than_are_served_are_told(server: StudioServer, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(tabs, "MOST_TABS", 1)
+    monkeypatch.setattr(tabs, "STUDIO_TABS_MAX", 1)
     with opened(server) as first:
         assert "tab" in first.start
         with pytest.raises(websockets.ConnectionClosed, match="1 tabs are open"), opened(server):
@@ -336,7 +336,7 @@ def test_a_move_never_waits_for_another_question(page: Page):
 
 
 def test_a_question_that_takes_too_long_is_given_up(server: StudioServer, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(tabs, "ASK_SECONDS", 0.3)
+    monkeypatch.setattr(tabs, "REQUEST_TIMEOUT_S", 0.3)
     with opened(server) as page:
         before = page.ask("open")["answer"]["process"]
         for kind in ("busy", "sleep"):
@@ -440,7 +440,7 @@ def test_a_message_that_is_too_large_ends_the_tab(server: StudioServer):
 def test_too_many_questions_at_once_are_refused(page: Page, monkeypatch: pytest.MonkeyPatch):
     from hrsynth.present.studio import processes
 
-    monkeypatch.setattr(processes, "MOST_WAITING", 3)
+    monkeypatch.setattr(processes, "STUDIO_WAITING_REQUESTS_MAX", 3)
     numbers = [page.send("sleep", seconds=0.5) for _ in range(10)]
     kinds = {each["n"]: each.get("kind") for each in (page.heard() for _ in numbers)}
     assert [*kinds.values()].count("TooMany") >= 5
@@ -506,7 +506,7 @@ def test_a_file_of_a_gigabyte_is_refused_before_it_comes(server: StudioServer, p
 def test_a_file_without_a_length_is_counted_while_it_comes(
     server: StudioServer, page: Page, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(uploads, "LARGEST_UPLOAD", 100_000)
+    monkeypatch.setattr(uploads, "UPLOAD_MAX_BYTES", 100_000)
     tab, sent = page.start["tab"], 0
     head = (
         f"POST /{server.guard.secret}/upload?tab={tab}&name=big.stl HTTP/1.1\r\n"
@@ -528,7 +528,7 @@ def test_a_file_without_a_length_is_counted_while_it_comes(
 
 
 def test_no_more_files_than_a_tab_may_have(server: StudioServer, page: Page, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(uploads, "MOST_UPLOADS", 2)
+    monkeypatch.setattr(uploads, "UPLOADED_FILES_MAX", 2)
     names = ["a", "b", "a", "c", "b"]
     assert [status_of(posted(server, page.start["tab"], name, b"x")) for name in names] == [200, 200, 200, 400, 200]
 
@@ -542,7 +542,7 @@ def test_slow_senders_are_given_up(
     server: StudioServer, page: Page, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ):
     for module in (serving, uploads):
-        monkeypatch.setattr(module, "SENDER_SECONDS", 0.2)
+        monkeypatch.setattr(module, "SENDER_TIMEOUT_S", 0.2)
     tab, port = page.start["tab"], port_of(server)
     whole = (
         f"POST /{server.guard.secret}/upload?tab={tab}&name=a.urdf HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n"
@@ -587,7 +587,9 @@ def test_a_socket_of_another_page_is_refused_by_a_client_too(server: StudioServe
 
 def test_the_first_message_says_what_was_opened(tmp_path: Path):
     first = {"watch": ["1"], "camera": None}
-    made = StudioServer(Opening(tmp_path, {"robot": "3rrr_m1", "options": {}}, first=first, panels=False), desk=DESK)
+    made = StudioServer(
+        StartupState(tmp_path, {"robot": "3rrr_m1", "options": {}}, first=first, panels=False), desk=DESK
+    )
     try:
         with opened(made) as page:
             assert {**page.start, "tab": ""} == {
@@ -636,7 +638,7 @@ def test_thousands_of_questions_and_many_tabs_leave_nothing(server: StudioServer
 
 
 def test_processes_come_back_where_their_source_was_ended():
-    made = StudioServer(Opening(), desk=DESK)
+    made = StudioServer(StartupState(), desk=DESK)
     try:
         with opened(made) as page:
             first = page.ask("open")["answer"]["process"]

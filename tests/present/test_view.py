@@ -9,7 +9,7 @@ import pytest
 
 from hrsynth import check, load, modes, view
 from hrsynth.description import list_robots
-from hrsynth.geometry.vectors import unit
+from hrsynth.geometry.vectors import normalise_vector
 from hrsynth.mechanism import JointType
 from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.present.view.view import View
@@ -124,7 +124,7 @@ def test_every_joint_is_drawn_once_and_every_rod_ends_in_joint_centres(name: str
 def test_virtual_actuators_are_marked_and_motors_are_not_in_the_hidden_robot(name: str):
     found = seen(name)
     for machine in found.machines:
-        driven = {joint.name for joint in mechanism_of(found, machine).joints.values() if joint.actuated}
+        driven = {joint.name for joint in mechanism_of(found, machine).joints.values() if joint.is_actuated}
         role = "motor" if machine.key == "real" else "actuator"
         assert {shape.joint for shape in machine.shapes if shape.role in ("motor", "actuator")} == driven
         assert all(shape.role == role for shape in machine.shapes if shape.joint in driven)
@@ -138,7 +138,7 @@ def test_every_observed_leg_has_its_arrow_along_what_is_observed(name: str):
     for arrow, observed in zip(found.arrows, found.setup.observed, strict=True):
         assert isinstance(observed, Direction)
         d = found.setup.mechanism.links[observed.link].pose[:3, :3] @ observed.direction
-        assert unit(arrow.ends[1] - arrow.ends[0]) == pytest.approx(d, abs=DRAWN)
+        assert normalise_vector(arrow.ends[1] - arrow.ends[0]) == pytest.approx(d, abs=DRAWN)
         assert arrow.link == observed.link
 
 
@@ -176,10 +176,15 @@ def test_rails_are_as_long_as_their_carriages_go(name: str):
     for machine in found.machines:
         mechanism = mechanism_of(found, machine)
         rails = [shape for shape in machine.shapes if shape.kind == "rail"]
-        guides = [joint for joint in mechanism.joints.values() if joint.type.slides and mechanism.base in joint.links]
+        guides = [
+            joint for joint in mechanism.joints.values() if joint.type.has_translation and mechanism.base in joint.links
+        ]
         assert len(rails) == len(guides) == len(found.setup.decomposition.legs)
         for rail, joint in zip(rails, guides, strict=True):
-            link, way = machine.links.index(joint.other(mechanism.base)), unit(rail.points[1] - rail.points[0])
+            link, way = (
+                machine.links.index(joint.other(mechanism.base)),
+                normalise_vector(rail.points[1] - rail.points[0]),
+            )
             places = [moved(state.places[machine.key][link], joint.point) for state in states(found)]
             parts = [(p - rail.points[0]) @ way / np.linalg.norm(rail.points[1] - rail.points[0]) for p in places]
             assert 0 < min(parts) < 0.2

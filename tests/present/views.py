@@ -10,7 +10,7 @@ import numpy as np
 
 from hrsynth import load, view
 from hrsynth.mechanism import Joint, JointType, Mechanism
-from hrsynth.present.studio.server import StudioServer, view_server
+from hrsynth.present.studio.server import StudioServer, serve_view
 from hrsynth.present.view.states import ViewState
 from hrsynth.present.view.view import Machine, View
 
@@ -27,7 +27,7 @@ def seen(name: str) -> View:
 @contextmanager
 def serving(found: View) -> Iterator[StudioServer]:
     """The server of a view."""
-    server = view_server(found, open_=False)
+    server = serve_view(found, open_=False)
     yield server
     server.stop()
 

@@ -18,9 +18,9 @@ from hrsynth.kinematics.equivalence import EquivalenceCheck, check_equivalence
 from hrsynth.mechanism.model import Mechanism
 from hrsynth.rewrite.evidence import Evidence
 from hrsynth.rewrite.rule import Rule
-from hrsynth.rewrite.rules import rules
-from hrsynth.rewrite.strategy import FORMS, Rewriting
-from hrsynth.tolerances import SAME_RELATION
+from hrsynth.rewrite.rules import list_rules
+from hrsynth.rewrite.strategy import FORMS, RewriteTrace
+from hrsynth.tolerances import RELATION_ANGLE_TOL
 from kinematics.robots import ROBOTS, led, seen_by_oracle, setting_of, state_of
 from oracle import Oracle, same_relation
 from strategies import deltas, planar, pods
@@ -74,13 +74,13 @@ class Recorder:
         return found
 
 
-def rewritten(setup: ObservedRobot, form: str = "simplified") -> tuple[Rewriting, Recorder]:
+def rewritten(setup: ObservedRobot, form: str = "simplified") -> tuple[RewriteTrace, Recorder]:
     recorder = Recorder(setup)
     evidence = Evidence(setup.decomposition, setup.samples)
-    return FORMS[form](Rewriting.of(evidence, recorder)), recorder
+    return FORMS[form](RewriteTrace.of(evidence, recorder)), recorder
 
 
-def obeys(setup: ObservedRobot, form: str = "simplified", thorough: bool = False) -> Rewriting:
+def obeys(setup: ObservedRobot, form: str = "simplified", thorough: bool = False) -> RewriteTrace:
     """The law, for one robot: every step that passed, or (not ``thorough``) at most six of them, last ones included."""
     result, recorder = rewritten(setup, form)
     samples = setup.samples
@@ -95,11 +95,11 @@ def obeys(setup: ObservedRobot, form: str = "simplified", thorough: bool = False
         ours = seen_by_oracle(real, state, observation_model, length)
         for mechanism in found:
             oracle, reached = led(mechanism, observation_model, member.way)
-            assert same_relation(ours, seen_by_oracle(oracle, reached, observation_model, length)) < SAME_RELATION
+            assert same_relation(ours, seen_by_oracle(oracle, reached, observation_model, length)) < RELATION_ANGLE_TOL
     accepted = [step for step in result.steps if step.accepted]
     assert accepted[0].rule == "motors off"
     assert all(step.reason for step in result.steps)
-    assert all(step.largest_angle is None or step.largest_angle < SAME_RELATION for step in accepted)
+    assert all(step.largest_angle is None or step.largest_angle < RELATION_ANGLE_TOL for step in accepted)
     assert all(
         "refused, " in step.reason
         for step in result.steps
@@ -124,10 +124,10 @@ def accepted() -> frozenset[str]:
 
 
 @pytest.mark.some(5)
-@pytest.mark.parametrize("rule", rules(), ids=lambda rule: rule.name)
+@pytest.mark.parametrize("rule", list_rules(), ids=lambda rule: rule.name)
 def test_every_rule_has_a_robot(rule: Rule[Any, Any]) -> None:
     """Whatever file lies among the rules is found, has a stage of its own choice, and is accepted somewhere."""
-    assert rule in rules(rule.stage)
+    assert rule in list_rules(rule.stage)
     assert rule.source
     assert rule.name in accepted()
 

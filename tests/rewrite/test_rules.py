@@ -12,11 +12,11 @@ from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.kinematics.equivalence import check_equivalence
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import JointType, Mechanism, Motor
-from hrsynth.rewrite.evidence import Evidence, far_from, locus
+from hrsynth.rewrite.evidence import Evidence, choose_far_direction, fit_linear_locus
 from hrsynth.rewrite.rule import Proposal, Refusal
-from hrsynth.rewrite.rules import end_change, joint_substitution, leg_removal, lift, motors_off, pi_form, rules
+from hrsynth.rewrite.rules import end_change, joint_substitution, leg_removal, lift, list_rules, motors_off, pi_form
 from hrsynth.rewrite.state import State
-from hrsynth.rewrite.strategy import GENERAL, SIMPLIFIED, Rewriting, apply_unchecked
+from hrsynth.rewrite.strategy import GENERAL, SIMPLIFIED, RewriteTrace, apply_unchecked
 from kinematics.robots import derived, led, seen_by_oracle, setting_of, state_of
 from oracle import NotAssembled, Oracle, Undecided, logarithm, same_relation
 from strategies import deltas, random_direction, random_rotation
@@ -60,11 +60,11 @@ def evidence_of(setup: ObservedRobot) -> Evidence:
     return Evidence(setup.decomposition, setup.samples)
 
 
-def simplified(setup: ObservedRobot) -> Rewriting:
+def simplified(setup: ObservedRobot) -> RewriteTrace:
     def check(mechanism: Mechanism, bodies: tuple[str, ...]) -> object:
         return check_equivalence(setup.samples, mechanism, bodies=bodies, complete=False)
 
-    return SIMPLIFIED(Rewriting.of(evidence_of(setup), check))  # type: ignore[arg-type]
+    return SIMPLIFIED(RewriteTrace.of(evidence_of(setup), check))  # type: ignore[arg-type]
 
 
 def proposals(found: Iterable[Proposal | Refusal]) -> tuple[list[Proposal], list[Refusal]]:
@@ -185,7 +185,7 @@ def test_a_parallelogram_with_a_wrong_offset_is_caught(robot: str) -> None:
     """One crank's foot 2 % off: the carrier turns with the arm, and the actuator's angle is not the direction's."""
     setup = setting_of(robot, None, None, 3)
     before = GENERAL(
-        Rewriting.of(
+        RewriteTrace.of(
             evidence_of(setup),
             lambda m, bodies: check_equivalence(setup.samples, m, count=1, bodies=bodies, complete=False),
         )
@@ -248,7 +248,7 @@ def test_the_lift_has_virtual_motors_only(robot: str) -> None:
     """The lift has one motor a leg, a virtual one; every real motor is passive, and nothing is constrained."""
     setup = setting_of(robot, None, None, 3)
     state = lifted(setup)
-    driven = {n for n, joint in state.mechanism.joints.items() if joint.actuated}
+    driven = {n for n, joint in state.mechanism.joints.items() if joint.is_actuated}
     assert driven == {chain.actuator for chain in state.chains}
     assert driven.isdisjoint(setup.mechanism.joints)
     is_right(setup, state.mechanism)
@@ -261,7 +261,7 @@ def test_the_lift_has_virtual_motors_only(robot: str) -> None:
 def test_every_rule_gives_a_reason(robot: str) -> None:
     setup = setting_of(robot, None, None, 3)
     state, evidence = lifted(setup), evidence_of(setup)
-    for rule in rules():
+    for rule in list_rules():
         assert rule.source
         for leg in setup.decomposition.labels:
             for found in rule.proposals(state, evidence, leg):
@@ -272,7 +272,7 @@ def test_a_rule_does_not_touch_the_state_it_is_given() -> None:
     setup = setting_of("delta", None, None, 3)
     state, evidence = lifted(setup), evidence_of(setup)
     before = (dict(state.mechanism.links), dict(state.mechanism.joints), state.chains, dict(state.owners))
-    for rule in rules():
+    for rule in list_rules():
         if rule is not lift.RULE:
             for leg in setup.decomposition.labels:
                 list(rule.proposals(state, evidence, leg))
@@ -318,11 +318,11 @@ def test_the_part_before_the_observed_link(robot: str, joints: int, dimension: i
         assert proximal is not None
         assert len(proximal.joints) == joints
         assert proximal.anchor_locus.dimension == dimension
-        assert proximal.translates is translates
+        assert proximal.is_translating is translates
         assert (proximal.single_revolute is not None) is (dimension == 2)
         if dimension == 2:
             axis = proximal.joints[0].axis
-            assert proximal.keeps(axis)
+            assert proximal.has_constant_direction(axis)
             assert proximal.turning_axis is not None
             assert abs(proximal.turning_axis @ axis) == pytest.approx(1)
 
@@ -332,7 +332,7 @@ def test_locus(dimension: int) -> None:
     rng = np.random.default_rng(dimension)
     basis = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     points = rng.normal(size=3) + rng.normal(size=(15, dimension)) @ basis[:dimension]
-    found = locus(points, 1.0)
+    found = fit_linear_locus(points, 1.0)
     assert found.dimension == dimension
     np.testing.assert_allclose(found.axes @ found.axes.T, np.eye(3), atol=1e-12)
     if dimension == 2:
@@ -342,8 +342,8 @@ def test_locus(dimension: int) -> None:
 def test_a_circle_lies_in_a_plane_and_a_cone_has_an_axis() -> None:
     angles = np.linspace(0, 1, 9)
     cone = np.column_stack((np.cos(angles), np.sin(angles), np.full(9, 0.4)))
-    assert locus(cone, 1.0).dimension == 2
-    assert abs(locus(cone, 1.0).normal[2]) == pytest.approx(1)
+    assert fit_linear_locus(cone, 1.0).dimension == 2
+    assert abs(fit_linear_locus(cone, 1.0).normal[2]) == pytest.approx(1)
 
 
 def test_far_from() -> None:
@@ -352,7 +352,7 @@ def test_far_from() -> None:
         u = random_direction(rng)
         near = [u + 0.1 * random_direction(rng) for _ in range(5)]
         directions = np.array([v / np.linalg.norm(v) for v in near])
-        e = far_from(directions)
+        e = choose_far_direction(directions)
         assert np.linalg.norm(e) == pytest.approx(1)
         assert np.max(np.abs(directions @ e)) < 0.3
 

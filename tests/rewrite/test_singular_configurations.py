@@ -19,17 +19,25 @@ import pytest
 from scipy.optimize import brentq, least_squares
 
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.geometry.vectors import Array, hat, inverse, perpendicular, pose, rotation_about, unit
-from hrsynth.kinematics.locked_twists import rezero
+from hrsynth.geometry.vectors import (
+    Array,
+    build_pose,
+    find_perpendicular,
+    hat,
+    invert_pose,
+    normalise_vector,
+    rotate_about_axis,
+)
+from hrsynth.kinematics.locked_twists import set_zero
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import JointType, Mechanism
 from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.rewrite.rule import AXES, LOOPS
-from hrsynth.rewrite.rules import leg_removal, pi_form, rules
+from hrsynth.rewrite.rules import leg_removal, list_rules, pi_form
 from hrsynth.rewrite.state import State, VirtualChain
-from hrsynth.rewrite.strategy import Rewriting
-from hrsynth.tolerances import SAME_RELATION
+from hrsynth.rewrite.strategy import RewriteTrace
+from hrsynth.tolerances import RELATION_ANGLE_TOL
 from kinematics.robots import walked
 from oracle import GAP, Oracle, Undecided, same_relation, span, split_rank
 from rewrite.test_rules import lifted, simplified
@@ -62,22 +70,22 @@ class Case:
 
 def turn(axis: Array, angle: float, point: Array) -> Array:
     """The displacement that turns by an angle about an axis through a point; shape (4, 4)."""
-    R = rotation_about(axis, angle)
-    return pose(point - R @ point, R)
+    R = rotate_about_axis(axis, angle)
+    return build_pose(point - R @ point, R)
 
 
 def carry(old: tuple[Array, Array, Array], new: tuple[Array, Array, Array]) -> Array:
     """The displacement that takes a point and two unit vectors with a constant angle to others; shape (4, 4)."""
     R = np.column_stack([*new[1:], np.cross(*new[1:])]) @ np.linalg.inv(np.column_stack([*old[1:], np.cross(*old[1:])]))
-    return pose(new[0] - R @ old[0], R)
+    return build_pose(new[0] - R @ old[0], R)
 
 
 def swing(old: Array, new: Array, before: Array, after: Array) -> Array:
     """The displacement that takes a point to another and a direction by the shortest turn to another."""
     axis = np.cross(before, after)
     sine = float(np.linalg.norm(axis))
-    R = rotation_about(axis / sine, float(np.arctan2(sine, before @ after))) if sine > 1e-12 else np.eye(3)
-    return pose(new - R @ old, R)
+    R = rotate_about_axis(axis / sine, float(np.arctan2(sine, before @ after))) if sine > 1e-12 else np.eye(3)
+    return build_pose(new - R @ old, R)
 
 
 def displaced(robot: Mechanism, by: Mapping[str, Array]) -> Poses:
@@ -147,7 +155,7 @@ class Delta:
         return phase + float(sign * np.arccos(C / size))
 
     def at(self, p: Array, known: Mapping[int, float] | None = None) -> Poses | None:
-        by = {"platform": pose(p)}
+        by = {"platform": build_pose(p)}
         for k in self.legs:
             angle = (known or {}).get(k) if k in (known or {}) else self.angle(k, p)
             if angle is None:
@@ -155,7 +163,7 @@ class Delta:
             by[f"arm_{k}"] = D = turn(self.hinge[k].axis, angle, self.hinge[k].point)
             for x, (W, B) in zip("ab", self.ends[k], strict=True):
                 new = D[:3, :3] @ W + D[:3, 3]
-                by[f"rod_{k}{x}"] = swing(W, new, unit(B - W), unit(B + p - new))
+                by[f"rod_{k}{x}"] = swing(W, new, normalise_vector(B - W), normalise_vector(B + p - new))
         return displaced(self.robot, by)
 
     def drawn(self, rng: np.random.Generator) -> Array:
@@ -177,12 +185,16 @@ class Delta:
     def flat(self, rng: np.random.Generator) -> Poses | None:
         """Leg 1's arm a quarter turn from zero."""
         W, B = self.ends[1][0]
-        return self.along(rng, {1: rng.choice([-1, 1]) * np.pi / 2}, lambda: unit(unit(B - W) + rng.normal(size=3)))
+        return self.along(
+            rng,
+            {1: rng.choice([-1, 1]) * np.pi / 2},
+            lambda: normalise_vector(normalise_vector(B - W) + rng.normal(size=3)),
+        )
 
     def stretched(self, rng: np.random.Generator) -> Poses | None:
         """The rod of leg 3 in the plane of its arm and base axis."""
         a, angle, side = self.hinge[3].axis, rng.uniform(-1.5, 1.5), rng.uniform(0, 2 * np.pi)
-        r = rotation_about(a, angle) @ unit(self.arm(3))
+        r = rotate_about_axis(a, angle) @ normalise_vector(self.arm(3))
         return self.along(rng, {3: angle}, lambda: np.cos(side) * r + np.sin(side) * a)
 
     def lost(self, rng: np.random.Generator) -> Poses | None:
@@ -202,19 +214,21 @@ class Delta:
         along = (l2 - l1 - w @ w) / (2 * np.linalg.norm(w))
         if along**2 > l1:
             return None
-        start = perpendicular(unit(w))
-        v = along * unit(w) + np.sqrt(l1 - along**2) * (rotation_about(unit(w), rng.uniform(0, 2 * np.pi)) @ start)
+        start = find_perpendicular(normalise_vector(w))
+        v = along * normalise_vector(w) + np.sqrt(l1 - along**2) * (
+            rotate_about_axis(normalise_vector(w), rng.uniform(0, 2 * np.pi)) @ start
+        )
         return self.at(v - c, angles)
 
     def direction(self, k: int, p: Array) -> Array | None:
         """u of a leg; None out of reach."""
         angle = self.angle(k, p)
-        return None if angle is None else unit(self.rod(k, angle, p))
+        return None if angle is None else normalise_vector(self.rod(k, angle, p))
 
     def couples(self, p: Array) -> float:
         """det of the couples that the three pairs of rods transmit: zero where the platform can turn."""
         u = {k: self.direction(k, p) for k in self.legs}
-        return float(np.linalg.det([unit(np.cross(self.side(k), u[k])) for k in self.legs]))
+        return float(np.linalg.det([normalise_vector(np.cross(self.side(k), u[k])) for k in self.legs]))
 
     def released(self, rng: np.random.Generator) -> Poses | None:
         """Legs 1 and 2, their ends changed, no longer keep the platform from turning, leg 3 does: the couples of their
@@ -230,7 +244,9 @@ class Delta:
                 W, B = self.ends[k][0]
                 D, o = turn(self.hinge[k].axis, x[k - 1], self.hinge[k].point), outer[str(k)]
                 u = np.cross(np.cross(x[2:], self.side(k)), x[2:] - (x[2:] @ o) * o)
-                found.append(D[:3, :3] @ W + D[:3, 3] + np.linalg.norm(B - W) * np.sign(u @ (B - W)) * unit(u) - B)
+                found.append(
+                    D[:3, :3] @ W + D[:3, 3] + np.linalg.norm(B - W) * np.sign(u @ (B - W)) * normalise_vector(u) - B
+                )
             return np.array(found)
 
         for _ in range(10):
@@ -327,19 +343,19 @@ class Planar:
         return found, w - found
 
     def at(self, x: Array, known: Mapping[int, tuple[Array, Array]] | None = None) -> Poses | None:
-        by = {"platform": pose(plane(x[:2]), rotation_about(np.array([0, 0, 1.0]), x[2]))}
+        by = {"platform": build_pose(plane(x[:2]), rotate_about_axis(np.array([0, 0, 1.0]), x[2]))}
         for k in range(3):
             legs = (known or {}).get(k) or self.leg(k, x)
             if legs is None:
                 return None
             (c, d), n, z = legs, k + 1, np.array([0, 0, 1.0])
             by[f"crank_{n}"] = turn(z, between(self.crank[k], c), plane(self.foot[k]))
-            shift = pose(plane(c - self.crank[k]))
+            shift = build_pose(plane(c - self.crank[k]))
             if self.words[k][0] == "Π":
                 by["coupler"] = shift
                 by["second"] = turn(z, between(self.crank[k], c), plane(self.foot[k] + self.beside))
             if self.words[k][1] == "P":
-                by[f"rod_{n}"] = shift @ pose(plane(d - self.rod[k]))
+                by[f"rod_{n}"] = shift @ build_pose(plane(d - self.rod[k]))
             else:
                 by[f"rod_{n}"] = shift @ turn(z, between(self.rod[k], d), plane(self.foot[k] + self.crank[k]))
         return displaced(self.robot, by)
@@ -360,13 +376,13 @@ class Planar:
 
     def flat_loop(self, rng: np.random.Generator) -> Poses | None:
         """Leg 1's own parallelogram flat."""
-        c = rng.choice([-1, 1]) * np.linalg.norm(self.crank[0]) * unit(self.beside)
+        c = rng.choice([-1, 1]) * np.linalg.norm(self.crank[0]) * normalise_vector(self.beside)
         return self.along(rng, 0, c, self.rod_of(rng, 0))
 
     def stretched(self, rng: np.random.Generator) -> Poses | None:
         """Leg 3 stretched."""
         c = bend(rng.uniform(-1, 1)) @ self.crank[2]
-        return self.along(rng, 2, c, unit(c) * np.linalg.norm(self.rod[2]))
+        return self.along(rng, 2, c, normalise_vector(c) * np.linalg.norm(self.rod[2]))
 
     def normals(self, x: Array) -> float:
         """det of the lines through the tips along the cranks: zero where they meet in a point."""
@@ -405,25 +421,25 @@ class Pod:
 
     def moved(self, x: Array) -> Array:
         angle = float(np.linalg.norm(x[3:]))
-        return turn(x[3:] / angle, angle, self.robot.links["platform"].pose[:3, 3]) @ pose(x[:3])
+        return turn(x[3:] / angle, angle, self.robot.links["platform"].pose[:3, 3]) @ build_pose(x[:3])
 
     def at(self, x: Array, spun: Mapping[int, float] | None = None) -> Poses | None:
         by = {"platform": self.moved(x)}
         for k in self.legs:
             A, B = self.foot[k].point, self.tip[k]
             new = by["platform"][:3, :3] @ B + by["platform"][:3, 3]
-            before, u = unit(B - A), unit(new - A)
+            before, u = normalise_vector(B - A), normalise_vector(new - A)
             if self.word[0] == "S":
                 by[f"lower_{k}"] = swing(A, A, before, u)
             else:
                 first, inner = self.foot[k].axes
                 if spun and k in spun:  # u is along the first axis: the U turns about it freely
-                    second = rotation_about(first, spun[k]) @ perpendicular(first)
+                    second = rotate_about_axis(first, spun[k]) @ find_perpendicular(first)
                 else:
-                    second = unit(np.cross(first, u)) * np.sign(np.cross(first, before) @ inner)
+                    second = normalise_vector(np.cross(first, u)) * np.sign(np.cross(first, before) @ inner)
                 by[f"lower_{k}"] = carry((A, inner, before), (A, second, u))
             D = by[f"lower_{k}"]
-            by[f"upper_{k}"] = pose(new - (D[:3, :3] @ B + D[:3, 3])) @ D
+            by[f"upper_{k}"] = build_pose(new - (D[:3, :3] @ B + D[:3, 3])) @ D
         return displaced(self.robot, by)
 
     def pointing(self, rng: np.random.Generator, k: int, direction: Array) -> Array:
@@ -438,7 +454,7 @@ class Pod:
         """The determinant of the speeds of tips 1 to 3 along their legs."""
         D = self.moved(x)
         B = [D[:3, :3] @ self.tip[k] + D[:3, 3] for k in (1, 2, 3)]
-        u = [unit(B[k - 1] - self.foot[k].point) for k in (1, 2, 3)]
+        u = [normalise_vector(B[k - 1] - self.foot[k].point) for k in (1, 2, 3)]
         b = [B[(i + 1) % 3] - B[i] for i in range(3)]
         return float(np.prod([u[i] @ b[i] for i in range(3)]) - np.prod([u[(i + 1) % 3] @ b[i] for i in range(3)]))
 
@@ -469,10 +485,10 @@ def upu(rng: np.random.Generator) -> Case:
     for k in (1, 2, 3):
         angle = 2 * np.pi * k / 3 + rng.uniform(-0.3, 0.3)
         A, B = (r * np.array([np.cos(angle), np.sin(angle), 0]) + [0, 0, h] for r, h in ((1, 0), (0.6, 1)))
-        u = unit(B - A)
+        u = normalise_vector(B - A)
         inner, above = rng.normal(size=3), rng.normal(size=3)
-        inner = unit(inner)
-        first = unit(u - (u @ inner) * inner) if k == 1 else random_normal(rng, inner)
+        inner = normalise_vector(inner)
+        first = normalise_vector(u - (u @ inner) * inner) if k == 1 else random_normal(rng, inner)
         builder.link(f"lower_{k}", A)
         builder.link(f"upper_{k}", B)
         builder.joint(f"foot_{k}", "U", "base", f"lower_{k}", A, axis=first, axis2=inner)
@@ -483,14 +499,14 @@ def upu(rng: np.random.Generator) -> Case:
             f"upper_{k}",
             "platform",
             B,
-            axis=unit(above),
-            axis2=random_normal(rng, unit(above)),
+            axis=normalise_vector(above),
+            axis2=random_normal(rng, normalise_vector(above)),
             loop=k > 1,
         )
         builder.observe(str(k), f"upper_{k}", u)
     special = builder.build(platform="platform")
     model = PinocchioModel(special)
-    robot = rezero(walked(model, int(rng.integers(1 << 30)), 3, 0.15))
+    robot = set_zero(walked(model, int(rng.integers(1 << 30)), 3, 0.15))
     holds = []
     for seed in range(3):
         at = walked(PinocchioModel(robot), seed, 3, 0.1)
@@ -505,18 +521,18 @@ def stand(state: State, real: Mechanism, at: Poses) -> Array:
     """The state of a rewritten mechanism (reference: the base) where the real robot's links are at these poses: T
     follows A, virtual joints point along u, cranks turn with the arm."""
     mechanism, found = state.mechanism, dict(at)
-    moved = {name: at[name] @ inverse(link.pose) for name, link in real.links.items()}
+    moved = {name: at[name] @ invert_pose(link.pose) for name, link in real.links.items()}
     for chain in state.chains:
         D, joint = moved[chain.link], mechanism.joints[chain.actuator]
         A, u = D[:3, :3] @ chain.anchor + D[:3, 3], D[:3, :3] @ chain.direction
         shift = A - chain.anchor
         if chain.carrier not in at:
-            found[chain.carrier] = pose(shift) @ mechanism.links[chain.carrier].pose
+            found[chain.carrier] = build_pose(shift) @ mechanism.links[chain.carrier].pose
         gone = np.zeros(3)
         for name, link in zip(chain.sliders, chain.slider_links, strict=False):
             axis = mechanism.joints[name].axis
             gone = gone + (axis @ shift) * axis
-            found[link] = pose(gone) @ mechanism.links[link].pose
+            found[link] = build_pose(gone) @ mechanism.links[link].pose
         if chain.bearing or chain.spins:
             turned = carry((chain.anchor, joint.axis, chain.direction), (A, joint.axis, u))
             if joint.type is JointType.UNIVERSAL:
@@ -525,7 +541,7 @@ def stand(state: State, real: Mechanism, at: Poses) -> Array:
                 now = np.cross(first, u)
                 now = now if np.linalg.norm(now) > 1e-9 else D[:3, :3] @ side - (first @ D[:3, :3] @ side) * first
                 sign = np.sign(side @ second)
-                turned = carry((chain.anchor, second, chain.direction), (A, sign * unit(now), u))
+                turned = carry((chain.anchor, second, chain.direction), (A, sign * normalise_vector(now), u))
             place_spinning(state, found, chain, turned)
     for name, body in mechanism.links.items():
         if name not in found:  # a crank: it turns as the arm to which T's anchor belongs
@@ -534,7 +550,7 @@ def stand(state: State, real: Mechanism, at: Poses) -> Array:
             base = next(j for j in mechanism.joints_of(name) if mechanism.reference in j.links)
             R = moved[str(chain.before)][:3, :3]
             assert np.allclose(R @ arm.axis, arm.axis)
-            found[name] = pose(base.point - R @ base.point, R) @ body.pose
+            found[name] = build_pose(base.point - R @ base.point, R) @ body.pose
     return np.array([found[name] for name in mechanism.links])
 
 
@@ -544,15 +560,15 @@ def place_spinning(state: State, found: Poses, chain: VirtualChain, turned: Arra
     if chain.bearing:
         found[chain.bearing] = turned @ mechanism.links[chain.bearing].pose
         return
-    spin = turned @ mechanism.links[chain.link].pose @ inverse(found[chain.link])
+    spin = turned @ mechanism.links[chain.link].pose @ invert_pose(found[chain.link])
     for joint in mechanism.joints.values():
         rod = joint.successor
         if joint.type is JointType.PRISMATIC and chain.link in joint.links:
             found[joint.other(chain.link)] = spin @ found[joint.other(chain.link)]
         elif joint.predecessor == chain.carrier and rod in own and rod != chain.link:
-            at = found[rod] @ inverse(mechanism.links[rod].pose)
+            at = found[rod] @ invert_pose(mechanism.links[rod].pose)
             point, R = at[:3, :3] @ joint.point + at[:3, 3], spin[:3, :3]
-            found[rod] = pose(point - R @ point, R) @ found[rod]
+            found[rod] = build_pose(point - R @ point, R) @ found[rod]
     found[chain.link] = spin @ found[chain.link]
 
 
@@ -641,11 +657,14 @@ def not_flat(setup: ObservedRobot, hidden: State, at: Poses) -> bool:
             link = joint.other(chain.carrier)
             for base in mechanism.joints_of(link):
                 if mechanism.base in base.links and base.type is JointType.REVOLUTE and link != chain.link:
-                    D = state[link] @ inverse(mechanism.links[link].pose)
+                    D = state[link] @ invert_pose(mechanism.links[link].pose)
                     radius = joint.point - base.point
                     crank = D[:3, :3] @ (radius - (radius @ base.axis) * base.axis)
                     feet.append(base.point - (base.point @ base.axis) * base.axis)
-        if len(feet) == 2 and np.linalg.norm(np.cross(unit(feet[1] - feet[0]), unit(crank))) < 1e-6:
+        if (
+            len(feet) == 2
+            and np.linalg.norm(np.cross(normalise_vector(feet[1] - feet[0]), normalise_vector(crank))) < 1e-6
+        ):
             return False
     return True
 
@@ -669,7 +688,7 @@ def spanned(setup: ObservedRobot, hidden: State, at: Poses) -> bool:
         own = alone.twist(alone.kernel(np.array([at[n] for n in part.links]))[0], leg.platform_link)
         scale = np.repeat([1 / length, 1.0], 3)[:, None]
         one, other = span(scale * own), span(scale * allowed)
-        if np.linalg.norm(other - one @ (one.T @ other)) > SAME_RELATION:
+        if np.linalg.norm(other - one @ (one.T @ other)) > RELATION_ANGLE_TOL:
             return False
     return True
 
@@ -705,7 +724,7 @@ KINDS: dict[str, tuple[str, Callable[[np.random.Generator], Case]]] = {
 MEMBERS = [(kind, seed) for seed in range(19) for kind in KINDS][:200]
 
 
-def derived_case(kind: str, seed: int) -> tuple[Case, ObservedRobot, Rewriting]:
+def derived_case(kind: str, seed: int) -> tuple[Case, ObservedRobot, RewriteTrace]:
     """The first random robot of a kind that has the configurations, and for which the rule is accepted."""
     rng, (rule, make) = np.random.default_rng(seed), KINDS[kind]
     for _ in range(200):
@@ -736,9 +755,9 @@ def test_the_relation_is_kept_where_the_conditions_hold(kind: str, seed: int) ->
 
     for poses in case.holds:
         assert all(CONDITIONS[each](setup, hidden, poses) for each in asked)
-        assert max(at(poses)) < SAME_RELATION
-    (rule,) = (each for each in rules() if each.name == KINDS[kind][0])
+        assert max(at(poses)) < RELATION_ANGLE_TOL
+    (rule,) = (each for each in list_rules() if each.name == KINDS[kind][0])
     assert not all(CONDITIONS[each](setup, hidden, case.fails) for each in rule.keeps)
     one, other = at(case.fails)
-    assert (one > DIFFERENT) if rule.name == "lift" else (one < SAME_RELATION)
+    assert (one > DIFFERENT) if rule.name == "lift" else (one < RELATION_ANGLE_TOL)
     assert other > DIFFERENT

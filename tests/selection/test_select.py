@@ -17,21 +17,21 @@ from hrsynth.analysis.aspects.path import path
 from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.modes.modes import modes
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.batch.pose_continuation import reach
-from hrsynth.cli import execute
+from hrsynth.batch.pose_continuation import track_to_pose
+from hrsynth.cli import run_command
 from hrsynth.description import load
-from hrsynth.errors import BadRequest, PoseNotReached
-from hrsynth.geometry.vectors import pose, rotation_from_rpy
+from hrsynth.errors import BadRequest, PoseReachFailure
+from hrsynth.geometry.vectors import build_pose, convert_rpy_to_rotation
 from hrsynth.mechanism.pose import Pose
 from hrsynth.progress import on_progress, report
-from hrsynth.selection.loop_ends import LoopEnds, fewer_are_better
+from hrsynth.selection.loop_ends import LoopEnds, explain_smaller_set
 from hrsynth.selection.select import Candidate, Criteria, Selection, _Work, select
-from hrsynth.selection.sight import CameraView, are_hidden, camera_at
+from hrsynth.selection.sight import CameraView, find_hidden_points, parse_camera_pose
 from hrsynth.simulation.camera import Camera, cylinders
 from hrsynth.simulation.equilibria.attraction_radius import CertifiedRadius, certified_radius
 from hrsynth.simulation.equilibria.basins import basins
 from hrsynth.simulation.equilibria.equilibria import EquilibriumSearch
-from hrsynth.tolerances import SAME_RELATION
+from hrsynth.tolerances import RELATION_ANGLE_TOL
 
 START, GOAL = "x=0,y=0,z=-0.75,phi=0", "x=-0.2,y=0,z=-0.56,phi=0"
 
@@ -54,7 +54,7 @@ def work() -> _Work:
     setup = ObservedRobot.of(load("quattro"))
     all_samples = setup.all_samples
     ends = [
-        reach(all_samples.start, all_samples.observation_model, Pose.parse(text), setup.motion)
+        track_to_pose(all_samples.start, all_samples.observation_model, Pose.parse(text), setup.motion)
         for text in (START, GOAL)
     ]
     cones = MeasurementBounds.of("0.1deg", None, setup.observed)
@@ -130,9 +130,9 @@ def test_bounds_of_errors_have_their_gaps():
         if each.errors is not None:
             own = (each.errors.position.gap, each.errors.orientation.gap)
             assert (record["position_gap"], record["orientation_gap"]) == own
-            assert len(each.legs) > 2 or max(own) < SAME_RELATION
+            assert len(each.legs) > 2 or max(own) < RELATION_ANGLE_TOL
     most = max(max(record["position_gap"] or 0, record["orientation_gap"] or 0) for record in found.to_dict()["sets"])
-    assert most > SAME_RELATION
+    assert most > RELATION_ANGLE_TOL
     assert "three cones or more: upper bounds, none more than" in str(found)
 
 
@@ -188,20 +188,20 @@ def test_why_fewer_legs_are_better() -> None:
     """Only where a set that holds them has more poses that attract, or a smaller radius; and of the largest such."""
     best = ("1", "2"), ends((), 0.03)
     assert (
-        fewer_are_better(best, [(("1", "2", "3"), ends((), 0.02)), (("1", "3", "4"), ends(("assembly mode",), 0.0))])
+        explain_smaller_set(best, [(("1", "2", "3"), ends((), 0.02)), (("1", "3", "4"), ends(("assembly mode",), 0.0))])
         is None
     )
     worse = [
         (("1", "2", "3"), ends(("assembly mode",), 0.03)),
         (("1", "2", "3", "4"), ends(("critical", "critical"), 0.03)),
     ]
-    assert fewer_are_better(best, worse) == (
+    assert explain_smaller_set(best, worse) == (
         "fewer legs are better here: with 1, 2 the stable equilibria found besides the goal are: none; with 1, 2, "
         "3, 4: 2 nonzero error; with redundant observation, nonzero errors can balance"
     )
-    assert fewer_are_better(best, [(("1", "2", "3"), ends(None, 0.0))]) is None
+    assert explain_smaller_set(best, [(("1", "2", "3"), ends(None, 0.0))]) is None
     assert "the proved attraction radius is 30 mm, with 1, 2, 3 it is 4 mm" in str(
-        fewer_are_better(best, [(("1", "2", "3"), ends((), 0.004))])
+        explain_smaller_set(best, [(("1", "2", "3"), ends((), 0.004))])
     )
 
 
@@ -211,12 +211,12 @@ def test_four_legs_are_worse_than_two_where_runs_show_it() -> None:
     at, found, shares = "x=0,y=0,z=-0.5,phi=0.3", [], []
     for watched in (("2", "3"), ("1", "2", "3", "4")):
         setup = ObservedRobot.of("quattro", watched)
-        goal = reach(setup.all_samples.start, setup.all_samples.observation_model, Pose.parse(at), setup.motion)
+        goal = track_to_pose(setup.all_samples.start, setup.all_samples.observation_model, Pose.parse(at), setup.motion)
         found.append((watched, LoopEnds.of(setup, goal)))
         runs = basins("quattro", list(watched), goal=at, grid="x=-0.4:0.4:5,y=-0.4:0.4:5,z=-0.6,phi=0.3", jobs=1)
         shares.append(sum(end.share for end in runs.ends if end.run_outcome.name == "goal"))
     assert shares[0] > 1.5 * shares[1] > 0
-    said = str(fewer_are_better(found[0], found[1:]))
+    said = str(explain_smaller_set(found[0], found[1:]))
     assert said.startswith("fewer legs are better here: with 2, 3 the stable equilibria found besides the goal are: ")
     assert said.endswith("with redundant observation, nonzero errors can balance")
 
@@ -226,7 +226,7 @@ def test_endings_are_those_of_the_single_questions() -> None:
     """The kinds of what attracts besides the goal, and the certified radius, of the set that is kept."""
     best = select("rrrrr_m1", start="x=0.05", goal="x=-0.01,y=0.03", runs=0).kept[0]
     setup = ObservedRobot.of("rrrrr_m1", best.legs)
-    goal = reach(
+    goal = track_to_pose(
         setup.all_samples.start, setup.all_samples.observation_model, Pose.parse("x=-0.01,y=0.03"), setup.motion
     )
     assert best.ends is not None
@@ -252,7 +252,7 @@ def test_a_singular_end_discards() -> None:
         low, high = (low, X[1, 0, 3]) if values[0] * values[1] < 0 else (X[1, 0, 3], high)
     pose = setup.motion.pose(X[1])
     there = replace(
-        work(), goal=reach(setup.all_samples.start, setup.all_samples.observation_model, pose, setup.motion)
+        work(), goal=track_to_pose(setup.all_samples.start, setup.all_samples.observation_model, pose, setup.motion)
     )
     found = there.first(("1", "4"))
     assert found.discarded is not None
@@ -269,19 +269,19 @@ def test_hidden_is_what_a_fine_search_finds() -> None:
         if abs(apart[nearest] - radius) < 0.02 or abs((1 - s[nearest]) * np.linalg.norm(point) - radius) < 0.03:
             continue
         expected = apart[nearest] < radius and (1 - s[nearest]) * np.linalg.norm(point) > radius
-        assert are_hidden(point[None], segment, radius)[0] == expected
+        assert find_hidden_points(point[None], segment, radius)[0] == expected
 
 
 def test_sight_sees_what_is_ahead_in_the_picture_and_not_hidden() -> None:
     setup = ObservedRobot.of(load("quattro"), samples=2)
     at = setup.all_samples.start
     rods = dict(zip(setup.labels, cylinders(setup.mechanism, setup.observed), strict=True))
-    below = rotation_from_rpy(0.0, 0.0, 0.0)
-    sight = CameraView(Camera(pose([0, 0, -3.0], below)), "base", rods)
+    below = convert_rpy_to_rotation(0.0, 0.0, 0.0)
+    sight = CameraView(Camera(build_pose([0, 0, -3.0], below)), "base", rods)
     assert all(part == 1.0 for part in sight.visible_parts(at).values())
-    away = CameraView(Camera(pose([0, 0, -3.0], rotation_from_rpy(math.pi, 0, 0))), "base", rods)
+    away = CameraView(Camera(build_pose([0, 0, -3.0], convert_rpy_to_rotation(math.pi, 0, 0))), "base", rods)
     assert all(part == 0.0 for part in away.visible_parts(at).values())
-    level = Camera(pose([-3.0, -3.0, -0.35], rotation_from_rpy(-math.pi / 2, 0, -math.pi / 4)))
+    level = Camera(build_pose([-3.0, -3.0, -0.35], convert_rpy_to_rotation(-math.pi / 2, 0, -math.pi / 4)))
     assert all(part == 1.0 for part in CameraView(level, "base", rods).visible_parts(at).values())
     fat = CameraView(level, "base", {leg: replace(rod, radius=0.12) for leg, rod in rods.items()})
     seen = fat.visible_parts(at)
@@ -320,28 +320,28 @@ def test_bad_requests(options: dict, word: str) -> None:
 @pytest.mark.some(1)
 @pytest.mark.parametrize("ends", [(START, "z=4"), ("x=4", GOAL)])
 def test_ends_out_of_reach(ends: tuple[str, str]) -> None:
-    with pytest.raises(PoseNotReached):
+    with pytest.raises(PoseReachFailure):
         select(load("quattro"), start=ends[0], goal=ends[1])
 
 
 def test_a_camera_has_a_whole_pose() -> None:
-    assert camera_at("x=0,y=0,z=1,rpy=180deg/0/0", 500.0).focal == 500.0
-    assert camera_at("x=0,y=0,z=1,rpy=180deg/0/0", 500.0).place[2, 2] == pytest.approx(-1)
+    assert parse_camera_pose("x=0,y=0,z=1,rpy=180deg/0/0", 500.0).focal == 500.0
+    assert parse_camera_pose("x=0,y=0,z=1,rpy=180deg/0/0", 500.0).place[2, 2] == pytest.approx(-1)
 
 
 @pytest.mark.slow
 def test_command_line(capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["select", "rrrrr_m1", "--start", "x=0.05", "--goal", "x=-0.01,y=0.03", "--runs", "1"]
-    assert execute([*arguments, "--visible-from", "auto", "--json"]) == 0
+    assert run_command([*arguments, "--visible-from", "auto", "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
     assert data["command"] == "select"
     assert data["best"] == next(each["legs"] for each in data["sets"] if each["discarded"] is None)
     assert {"legs", "verdict", "discarded", "position_mm", "modes", "aspect", "run", "seen"} <= data["sets"][0].keys()
-    assert execute([*arguments, "--size", "1"]) == 0
+    assert run_command([*arguments, "--size", "1"]) == 0
     out, err = capsys.readouterr()
     assert "partially controllable" in out
     assert err == ""
-    assert execute(["select", "quattro", "--start", "x=9", "--goal", "x=0"]) == 3
+    assert run_command(["select", "quattro", "--start", "x=9", "--goal", "x=0"]) == 3
     assert len(capsys.readouterr().err.splitlines()) == 1
 
 
@@ -359,7 +359,7 @@ def test_cameras_that_are_none(options: dict[str, object], word: str):
 
 
 def test_unreachable_ends_are_told():
-    with pytest.raises(PoseNotReached) as caught:
+    with pytest.raises(PoseReachFailure) as caught:
         select(load("delta"), start="x=9", goal="x=0")
     assert caught.value.exit_status == 3
 

@@ -24,12 +24,12 @@ import numpy as np
 
 from hrsynth.analysis.aspects.path import PathPlanner
 from hrsynth.analysis.aspects.verdicts import SEPARATED
-from hrsynth.budgets import RUN_AWAY
+from hrsynth.budgets import RUN_ESCAPE_DISTANCE_MAX
 from hrsynth.description import load
-from hrsynth.geometry.vectors import hat, rotation_from_rpy
+from hrsynth.geometry.vectors import convert_rpy_to_rotation, hat
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.locked_twists import interaction
-from hrsynth.kinematics.velocity_relation import relation
+from hrsynth.kinematics.locked_twists import compute_interaction
+from hrsynth.kinematics.velocity_relation import compute_relation
 from hrsynth.mechanism.model import Mechanism
 from hrsynth.simulation.law import FixedDirections, Law, directions
 from hrsynth.simulation.outcome import ANTIPODAL, BOUNDARY, ENDINGS, GOAL, MINIMUM, MODE
@@ -88,14 +88,14 @@ def untrue(found: Servo) -> Iterator[str]:
     if found.outcome == MODE:
         yield from _no_mode(found)
     if found.outcome == MINIMUM:
-        M = interaction(at, observation_model)
+        M = compute_interaction(at, observation_model)
         L = np.vstack([-hat(w) @ M[3 * i : 3 * i + 3] for i, w in enumerate(found.desired)])
         if np.linalg.norm(np.linalg.pinv(L, rcond=1e-4) @ e.ravel()) > 1e-5:
             yield "the command does not vanish"
     if found.outcome == BOUNDARY:
         moved = np.linalg.norm(found.way[-1] - found.way[0]) / at.model.length
-        dof = relation(at, observation_model).dof
-        if moved < RUN_AWAY and dof.value == found.setup.dof and dof.weakest > 1e-2:
+        dof = compute_relation(at, observation_model).dof
+        if moved < RUN_ESCAPE_DISTANCE_MAX and dof.value == found.setup.dof and dof.weakest > 1e-2:
             yield "no boundary is near"
 
 
@@ -112,7 +112,7 @@ def _no_mode(found: Servo) -> Iterator[str]:
         yield f"mode {found.run_outcome.matched} is the goal, or neither proved nor known to fit"
     p = [value or 0.0 for value in (mode.pose.x, mode.pose.y, mode.pose.z)]
     apart = float(np.linalg.norm(motion.position(X) - p))
-    turned = 0.0 if mode.pose.rpy is None else float(np.abs(X[:3, :3] - rotation_from_rpy(*mode.pose.rpy)).max())
+    turned = 0.0 if mode.pose.rpy is None else float(np.abs(X[:3, :3] - convert_rpy_to_rotation(*mode.pose.rpy)).max())
     if max(apart, turned) > THERE:
         yield f"{apart} m, {turned} from mode {found.run_outcome.matched}"
 

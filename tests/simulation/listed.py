@@ -13,20 +13,20 @@ from typing import Any
 import numpy as np
 
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.analysis.verdict import CONTROLLABLE, verdict_of
-from hrsynth.budgets import ENDING_STEPS, FARTHEST_ENDING
-from hrsynth.constraints.pattern import leg_ends
+from hrsynth.analysis.verdict import CONTROLLABLE, compute_verdict
+from hrsynth.budgets import EQUILIBRIUM_COORDINATE_MAX, EQUILIBRIUM_START_STEPS_MAX
+from hrsynth.constraints.pattern import list_leg_ends
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.simulation.equilibria.descent import LONGEST_STEP, CriticalPoint, Expansion, are_closed, walk_at_random
-from hrsynth.simulation.equilibria.equilibria import NEARBY, EquilibriumSearch
+from hrsynth.simulation.equilibria.descent import DESCENT_STEP_MAX, CriticalPoint, Expansion, are_closed, walk_at_random
+from hrsynth.simulation.equilibria.equilibria import MODE_WALK_FIRST_STEP_FRACTION, EquilibriumSearch
 from hrsynth.simulation.equilibria.equilibrium import CRITICAL, Equilibrium
 from hrsynth.simulation.equilibria.error import DirectionTerm, ErrorSystem
 from hrsynth.simulation.equilibria.search import CountedCriticalPoint, in_mode, marks, starts
 from hrsynth.simulation.outcome import ANTIPODAL, BOUNDARY, GOAL, MINIMUM, MODE
 from hrsynth.simulation.result import Servo
-from hrsynth.tolerances import CRITICAL as AT_ZERO
-from hrsynth.tolerances import CRITICAL_FLAT, SAME_ENDING
+from hrsynth.tolerances import CRITICAL_CURVATURE_TOL, CRITICAL_POINT_DISTANCE_TOL
+from hrsynth.tolerances import CRITICAL_GRADIENT_TOL as AT_ZERO
 from simulation.scenes import Legs, setting
 
 SINGULAR, CONTINUUM, APART, OUTSIDE = "singular", "family", "apart", "outside"
@@ -61,14 +61,14 @@ def random_sets(name: str, wanted: int) -> Iterator[Legs]:
         choice = list(combinations(found.labels, size))
         legs = choice[int(rng.integers(len(choice)))]
         watching = setting(name, legs)
-        if verdict_of(watching, legs, watching.samples).verdict == CONTROLLABLE:
+        if compute_verdict(watching, legs, watching.samples).verdict == CONTROLLABLE:
             sets += 1
             yield legs
 
 
 def known(places: Sequence[Array], place: Array) -> bool:
     """Whether one of some places is the same."""
-    return bool(places) and bool(np.abs(np.array(places) - place).max(axis=1).min() < SAME_ENDING)
+    return bool(places) and bool(np.abs(np.array(places) - place).max(axis=1).min() < CRITICAL_POINT_DISTANCE_TOL)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +86,7 @@ class Rests:
         if known(self.places, place):
             return False
         flat = [each for _, each in self.continua]
-        if np.any(np.abs(point.curvatures) < SAME_ENDING) and not known(flat, place):
+        if np.any(np.abs(point.curvatures) < CRITICAL_POINT_DISTANCE_TOL) and not known(flat, place):
             self.continua.append((float(np.sqrt(2 * max(point.value, 0.0))), place))
             return False
         self.points.append(point)
@@ -96,7 +96,7 @@ class Rests:
     def read(self, number: int) -> Equilibrium | None:
         """A rest as a pose of the robot, in its operation mode."""
         system, found, q = self.search.system, self.search.setup, self.points[number].q[None]
-        nearby = walk_at_random(system, q, np.random.default_rng(0), 2, NEARBY)
+        nearby = walk_at_random(system, q, np.random.default_rng(0), 2, MODE_WALK_FIRST_STEP_FRACTION)
         return (
             self.search.read(CountedCriticalPoint(self.points[number], 0))
             if in_mode(system, found, nearby)[0]
@@ -146,7 +146,11 @@ class Lists:
         """The rests that are new to which starts lead, by the numbers of the goals: those that leave no loop open."""
         systems = [each.search.system for each in self.every]
         found = descents(systems, [q for q, _ in pairs], [k for _, k in pairs], self.idle)
-        good = are_closed(systems[0], np.array([point.q for _, point in found]), SAME_ENDING) if found else ()
+        good = (
+            are_closed(systems[0], np.array([point.q for _, point in found]), CRITICAL_POINT_DISTANCE_TOL)
+            if found
+            else ()
+        )
         found = [each for each, kept in zip(found, good, strict=True) if kept]
         news: dict[int, list[CriticalPoint]] = {}
         for (k, point), place in zip(found, self.places([point.q for _, point in found]), strict=True):
@@ -159,7 +163,7 @@ class Lists:
         found, system = self.setting, self.every[0].search.system
         points = [CriticalPoint(each, each, 0.0, each, 0.0) for each in q]
         every, seen = found.all_samples.observation_model.observations, {(o.leg, o.link) for o in found.observed}
-        told = marks(system, found, leg_ends(found.decomposition), points)
+        told = marks(system, found, list_leg_ends(found.decomposition), points)
         if not len(points):
             return told
         bodies = told.shape[1] - 3 * len(every)
@@ -186,16 +190,16 @@ def descents(
             (int(k[i]), CriticalPoint(q[i], at.multipliers[i], float(at.residual[i]), at.curvatures[i], float(at.E[i])))
             for i in np.flatnonzero(done)
         ]
-        size = np.maximum(np.abs(at.curvatures), CRITICAL_FLAT)
+        size = np.maximum(np.abs(at.curvatures), CRITICAL_CURVATURE_TOL)
         near = (at.residual < 1e-3) & (np.abs(at.slope / size).max(axis=-1) < 0.05)
         sign = np.where(near[:, None], -np.sign(at.curvatures), -1.0)
         step = (at.directions @ (sign * at.slope / size)[..., None])[..., 0]
         ahead = q + shortened(step) + shortened(at.closing)
-        going = ~done & np.isfinite(ahead).all(axis=-1) & (np.abs(ahead).max(axis=-1) < FARTHEST_ENDING)
+        going = ~done & np.isfinite(ahead).all(axis=-1) & (np.abs(ahead).max(axis=-1) < EQUILIBRIUM_COORDINATE_MAX)
         live = [
             (ahead[i], number, steps + 1)
             for i, (_, number, steps) in enumerate(live)
-            if going[i] and steps + 1 < ENDING_STEPS
+            if going[i] and steps + 1 < EQUILIBRIUM_START_STEPS_MAX
         ]
     return found
 
@@ -203,7 +207,7 @@ def descents(
 def shortened(step: Array) -> Array:
     """Steps (c, N), none of whose changes is longer than ``LONGEST_STEP``."""
     size = np.abs(step).max(axis=-1, keepdims=True)
-    return step * np.minimum(1.0, LONGEST_STEP / np.maximum(size, LONGEST_STEP))
+    return step * np.minimum(1.0, DESCENT_STEP_MAX / np.maximum(size, DESCENT_STEP_MAX))
 
 
 @dataclass(frozen=True)

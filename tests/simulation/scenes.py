@@ -13,13 +13,13 @@ from _pytest.mark import ParameterSet
 
 from hrsynth.analysis.configuration_report import REGULAR, ConfigurationAnalysis
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.analysis.pose_requests import configurations_at
-from hrsynth.batch.pose_continuation import reach
+from hrsynth.analysis.pose_requests import solve_configurations
+from hrsynth.batch.pose_continuation import track_to_pose
 from hrsynth.description import list_robots, load
-from hrsynth.errors import PoseNotReached
+from hrsynth.errors import PoseReachFailure
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.walking import random_walk
-from hrsynth.mechanism.pose import asked_pose
+from hrsynth.kinematics.walking import walk_randomly
+from hrsynth.mechanism.pose import parse_pose
 from hrsynth.simulation.servo import ServoTask
 
 CONTROLLABLE = [
@@ -82,7 +82,7 @@ def setting(name: str, watched: Legs | None = None) -> ObservedRobot:
 
 def goal(name: str) -> ClosedConfiguration:
     """The configuration at the pose of GOALS."""
-    return configurations_at(setting(name), [asked_pose(GOALS[name])])[0]
+    return solve_configurations(setting(name), [parse_pose(GOALS[name])])[0]
 
 
 @cache
@@ -109,13 +109,13 @@ def regular(
     examiner = ConfigurationAnalysis(found)
     observation_model, start = found.all_samples.observation_model, found.all_samples.start
     usual = np.median([examiner.classify(at).distances.type2 or 0.0 for at in found.configurations])
-    for at in islice(random_walk(start, tried, seed=seed, steps=steps), apart - 1, None, apart):
+    for at in islice(walk_randomly(start, tried, seed=seed, steps=steps), apart - 1, None, apart):
         posture = examiner.classify(at)
         if posture.hidden.state != REGULAR or (posture.distances.type2 or 0.0) < distance * usual:
             continue
         try:
-            there = reach(start, observation_model, posture.pose, found.motion)
-        except PoseNotReached:
+            there = track_to_pose(start, observation_model, posture.pose, found.motion)
+        except PoseReachFailure:
             continue
         yield there
 

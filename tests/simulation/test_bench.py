@@ -36,7 +36,7 @@ def test_a_mock_up_has_the_freedoms_of_the_robot_and_its_motors(name: str):
     start, _ = found.all_samples.start.kernel()
     assert model.nv - int(np.sum(values > 1e-6 * values[0])) == start.shape[1]
     assert np.max(np.abs(data.efc_pos), initial=0.0) < 1e-12
-    assert model.nu == sum(joint.type.freedoms for joint in mechanism.joints.values() if joint.actuated)
+    assert model.nu == sum(joint.type.freedoms for joint in mechanism.joints.values() if joint.is_actuated)
     assert np.all(model.body_mass[1:] > 0)
     points = np.array([joint.point for joint in mechanism.joints.values()])
     assert np.all(data.xipos[1:] <= points.max(axis=0) + 1e-9)

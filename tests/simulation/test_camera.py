@@ -11,14 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hrsynth.description import load
-from hrsynth.errors import BadRequest, MissingExtra, NotRendered
-from hrsynth.geometry.vectors import Array, unit
+from hrsynth.errors import BadRequest, MissingExtra, RenderFailure
+from hrsynth.geometry.vectors import Array, normalise_vector
 from hrsynth.mechanism.noise import Noise
 from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.simulation import rendered_images
 from hrsynth.simulation.camera import Camera, Edges, cylinders, edges, place_camera, rebuilt, sensitivity
 from hrsynth.simulation.law import directions
-from hrsynth.simulation.noise import PERIOD, NoiseSamples, Sensors
+from hrsynth.simulation.noise import NOISE_PERIOD_S, NoiseSamples, Sensors
 from hrsynth.simulation.servo import servo
 from simulation.scenes import home
 
@@ -29,9 +29,9 @@ POINTS = st.tuples(NUMBERS, NUMBERS, st.floats(1, 3)).map(np.array)
 @given(POINTS, POINTS)
 def test_edges_are_the_two_tangent_planes_and_give_the_direction_back(a: Array, b: Array):
     radius = 0.01
-    if np.linalg.norm(b - a) < 0.1 or np.linalg.norm(np.cross(a, unit(b - a))) < 2 * radius:
+    if np.linalg.norm(b - a) < 0.1 or np.linalg.norm(np.cross(a, normalise_vector(b - a))) < 2 * radius:
         return
-    ends, u = np.array([a, b]), unit(b - a)
+    ends, u = np.array([a, b]), normalise_vector(b - a)
     for normal in edges(ends, radius):
         assert np.linalg.norm(normal) == pytest.approx(1)
         assert normal @ u == pytest.approx(0, abs=1e-12)
@@ -104,7 +104,7 @@ def cones(half_angle: float, count: int, horizon: float, seed: int) -> Sensors:
 
 @given(st.floats(1e-4, 0.2), st.integers(0, 1000), st.floats(0, 3))
 def test_measured_directions_lie_in_their_cones(half_angle: float, seed: int, time: float):
-    u = np.array([[0.0, 0.0, 1.0], unit([1, 2, 3])])
+    u = np.array([[0.0, 0.0, 1.0], normalise_vector([1, 2, 3])])
     seen = np.array(cones(half_angle, 2, 3, seed)(time, lambda link: np.eye(4), u))
     angles = np.arccos(np.clip(np.sum(seen * u, axis=1), -1, 1))
     assert np.all(angles <= half_angle + 1e-7)
@@ -113,8 +113,10 @@ def test_measured_directions_lie_in_their_cones(half_angle: float, seed: int, ti
 
 def test_cones_are_filled():
     u = np.array([[0.0, 0.0, 1.0]])
-    sense = cones(0.1, 1, 4000 * PERIOD, 0)
-    angles = [float(np.linalg.norm(np.cross(sense(n * PERIOD, lambda link: np.eye(4), u)[0], u))) for n in range(4000)]
+    sense = cones(0.1, 1, 4000 * NOISE_PERIOD_S, 0)
+    angles = [
+        float(np.linalg.norm(np.cross(sense(n * NOISE_PERIOD_S, lambda link: np.eye(4), u)[0], u))) for n in range(4000)
+    ]
     assert max(angles) > 0.095
     assert 0.03 < float(np.mean(angles)) < 0.07
 
@@ -161,7 +163,7 @@ def test_directions_from_rendered_pictures(name: str):
     stage = rendered_images.LegRenderer(mechanism, camera, observation_model.reference, rods)
     try:
         picture = stage.picture(scene.start.pose)
-    except NotRendered as error:
+    except RenderFailure as error:
         pytest.skip(str(error))
     assert picture.shape == (camera.height, camera.width, 3)
     u = directions(scene.start, observation_model)[0]

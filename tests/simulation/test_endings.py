@@ -45,7 +45,7 @@ def runs(
         monkeypatch.setattr("hrsynth.simulation.servo.LASTS", 0.8 * lasts)
         yield run_between(name, start, goal)
     for tolerance in (1e-5, 1e-7):
-        monkeypatch.setattr(engine, "INTEGRATED", tolerance)
+        monkeypatch.setattr(engine, "RUN_INTEGRATOR_TOL", tolerance)
         yield run_between(name, start, goal)
 
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import hrsynth
-from hrsynth.cli import execute
+from hrsynth.cli import run_command
 from hrsynth.errors import BadRequest
-from hrsynth.present.animations import AFTER, FRAMES, animation, captions
+from hrsynth.present.animations import CROSSING_CAPTION_FRAMES_COUNT, FRAMES, draw_animation, list_captions
 from hrsynth.present.outputs import OUTPUTS
 from hrsynth.simulation.servo import ServoTask
 
@@ -34,7 +34,7 @@ def test_what_a_film_does_not_draw_is_refused_before_the_run(
     sensor = ("point:platform@0.1,0,0", "point:platform@-0.1,0.1,0", "point:platform@0,-0.1,0")
     told = [word for each in sensor for word in ("--sensor", each)]
     assert (
-        execute(
+        run_command(
             [
                 "servo",
                 "gough_stewart",
@@ -64,8 +64,8 @@ def test_a_film_ends_with_the_watched_leg_over_its_wanted_place():
     found = hrsynth.servo(hrsynth.load("3rpr_m1"), start="x=0,y=0,phi=0", goal="x=0.03,y=0.02,phi=0.1")
     assert found.outcome == "goal"
     try:
-        image = image_of.open(io.BytesIO(animation(found)))
-    except hrsynth.errors.NotRendered:
+        image = image_of.open(io.BytesIO(draw_animation(found)))
+    except hrsynth.errors.RenderFailure:
         pytest.skip("nothing can be rendered here")
 
     def pale(number: int) -> int:
@@ -82,11 +82,11 @@ def test_a_film_ends_with_the_watched_leg_over_its_wanted_place():
 def test_the_words_of_a_film_tell_start_crossings_and_end():
     found = hrsynth.servo(hrsynth.load("3rpr_m1"), start="x=-0.08,y=-0.06,phi=-10deg", goal="x=0.034,y=0.23,phi=23deg")
     moments = list(range(0, len(found.run.times), 2))
-    words = list(captions(found, moments))
+    words = list(list_captions(found, moments))
     assert len(words) == len(moments)
     assert words[0].startswith("The start")
     assert words[-1].startswith("The end: the goal. The platform is")
     crossed = {place for place, each in zip(moments, words, strict=True) if "crossed" in each or "limit" in each}
     assert bool(crossed) == bool(found.track.passages)
     for each in found.track.passages or ():
-        assert any(0 <= place - each.place <= 2 * AFTER for place in crossed)
+        assert any(0 <= place - each.place <= 2 * CROSSING_CAPTION_FRAMES_COUNT for place in crossed)

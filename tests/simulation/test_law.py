@@ -9,11 +9,11 @@ import pytest
 
 from hrsynth.geometry.vectors import Array, hat
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.locked_twists import interaction
+from hrsynth.kinematics.locked_twists import compute_interaction
 from hrsynth.kinematics.tasks import solve
-from hrsynth.kinematics.velocity_relation import relation
+from hrsynth.kinematics.velocity_relation import compute_relation
 from hrsynth.simulation.law import Law, damped_inverses, directions
-from hrsynth.tolerances import DAMPED, SOLVED
+from hrsynth.tolerances import CLOSURE_SOLVER_TOL, CONTROLLER_DAMPING_MIN
 from simulation.scenes import CONTROLLABLE, few_first, home, regular, setting
 
 
@@ -36,11 +36,11 @@ def test_the_platform_moves_as_equation_11_says(name: str):
     law = law_of(name)
     desired = seen(goal, law)
     command = law.at(start, (desired, 0 * desired))
-    M = interaction(start, law.observation_model)
+    M = compute_interaction(start, law.observation_model)
     L = np.vstack([-hat(u) @ M[3 * i : 3 * i + 3] for i, u in enumerate(desired)])
     wanted = -law.gain * np.linalg.pinv(L) @ np.cross(seen(start, law), desired).ravel()
     moved = replace(law.observation_model, observations=(), bodies=()).rows(start) @ command.velocity
-    basis = relation(start, law.observation_model).twists
+    basis = compute_relation(start, law.observation_model).twists
     assert np.linalg.norm(moved - basis @ (basis.T @ moved)) < 1e-9 * max(1, np.linalg.norm(moved))
     assert np.linalg.norm(moved) == pytest.approx(np.linalg.norm(wanted), rel=1e-6)
     rates = np.concatenate([r @ command.velocity for r in directions(start, law.observation_model)[1]])
@@ -56,7 +56,7 @@ def test_the_error_falls_as_its_projection_says(name: str):
     command = law.at(start, (desired, 0 * desired))
 
     def error(sign: float) -> Array:
-        q, _ = solve(model, model.integrate(start.q, sign * step * command.velocity), tolerance=SOLVED)
+        q, _ = solve(model, model.integrate(start.q, sign * step * command.velocity), tolerance=CLOSURE_SOLVER_TOL)
         return np.cross(seen(ClosedConfiguration.of(model, q), law), desired).ravel()
 
     rate = (error(1.0) - error(-1.0)) / (2 * step)
@@ -84,9 +84,11 @@ def test_moving_desired_directions_are_fed_forward(name: str):
 
 
 def test_the_inverse_is_exact_where_nothing_is_weak_and_bounded_where_something_is():
-    assert damped_inverses(np.array([2.0, 1.0, 2 * DAMPED])) == pytest.approx([0.5, 1.0, 0.5 / DAMPED])
-    weak = np.geomspace(DAMPED, 1e-12, 50)
-    assert np.all(damped_inverses(weak) <= 1 / DAMPED + 1e-9)
+    assert damped_inverses(np.array([2.0, 1.0, 2 * CONTROLLER_DAMPING_MIN])) == pytest.approx(
+        [0.5, 1.0, 0.5 / CONTROLLER_DAMPING_MIN]
+    )
+    weak = np.geomspace(CONTROLLER_DAMPING_MIN, 1e-12, 50)
+    assert np.all(damped_inverses(weak) <= 1 / CONTROLLER_DAMPING_MIN + 1e-9)
     assert damped_inverses(np.array([0.0]))[0] == 0.0
 
 

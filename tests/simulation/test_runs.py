@@ -11,20 +11,20 @@ import numpy as np
 import pytest
 
 from hrsynth.analysis.aspects.path import PathPlanner
-from hrsynth.analysis.pose_requests import configurations_at
-from hrsynth.batch.pose_continuation import reach
+from hrsynth.analysis.pose_requests import solve_configurations
+from hrsynth.batch.pose_continuation import track_to_pose
 from hrsynth.description import load
-from hrsynth.errors import BadRequest, PoseNotReached
-from hrsynth.geometry.ranks import range_basis
+from hrsynth.errors import BadRequest, PoseReachFailure
+from hrsynth.geometry.ranks import compute_range_basis
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.tasks import solve
 from hrsynth.mechanism.model import Limits
-from hrsynth.mechanism.pose import asked_poses
+from hrsynth.mechanism.pose import parse_poses
 from hrsynth.simulation.crossings import track_run
 from hrsynth.simulation.outcome import BOUNDARY, GOAL, MODE
 from hrsynth.simulation.run import LIMIT
 from hrsynth.simulation.servo import servo
-from hrsynth.tolerances import DAMPED
+from hrsynth.tolerances import CONTROLLER_DAMPING_MIN
 from simulation.far import run_between, untold, untrue
 from simulation.listed import APART, OUTSIDE, Listed
 from simulation.scenes import BLIND, CONTROLLABLE, far_pairs, regular, setting
@@ -38,7 +38,7 @@ def near(name: str) -> tuple[ClosedConfiguration, ClosedConfiguration]:
     found = setting(name)
     goal = next(regular(name, 2, 0.5))
     kernel, _ = goal.kernel()
-    moves = range_basis((found.all_samples.observation_model.rows(goal) @ kernel).T, 1.0)[0]
+    moves = compute_range_basis((found.all_samples.observation_model.rows(goal) @ kernel).T, 1.0)[0]
     step = kernel @ moves @ np.full(moves.shape[1], 0.05 / np.sqrt(moves.shape[1]))
     q, _ = solve(goal.model, goal.model.integrate(goal.q, step), tolerance=1e-12)
     return ClosedConfiguration.of(goal.model, q), goal
@@ -91,12 +91,12 @@ def test_a_crossing_is_told_where_the_side_changes():
     """Next to where the smallest singular value is least, though sides are told apart only a centimetre away."""
     found = setting("quattro", ("1", "4"))
     along = -0.1757 + np.array([-2e-2, -1e-2, -1e-3, -1e-4, -2e-5, 2e-5, 1e-4, 2e-4, 1e-3, 1e-2, 2e-2])
-    at = configurations_at(found, asked_poses([f"x={x},y=-0.1931,z=-0.6481,phi=0.262" for x in along]))
+    at = solve_configurations(found, parse_poses([f"x={x},y=-0.1931,z=-0.6481,phi=0.262" for x in along]))
     track = track_run(at, found.samples.observation_model, found.all_samples.observation_model, found.dof)
     (crossing,) = track.crossings("type2")
     assert track.passages == (crossing,)
     assert abs(crossing.place - int(np.argmin(track.smallest))) <= 1
-    assert track.smallest[crossing.place + 1] < DAMPED
+    assert track.smallest[crossing.place + 1] < CONTROLLER_DAMPING_MIN
 
 
 @pytest.mark.parametrize("kind", ["type1", "type2"])
@@ -169,7 +169,7 @@ def met(one, far, two, near):
 )
 def test_a_run_says_what_it_leaves_out(name: str, given: dict[str, str], made: dict[str, Any], said: str):
     robot = load(name)
-    driven = next(joint for joint in robot.joints.values() if joint.actuated)
+    driven = next(joint for joint in robot.joints.values() if joint.is_actuated)
     assert servo(robot.changed(joints=[replace(driven, **made)]), **given).notes[0].startswith(said)
     assert not servo(robot, **given).notes
 
@@ -236,7 +236,7 @@ def test_a_trajectory_is_followed_where_parts_of_the_pose_depend_on_each_other(n
 
 def test_a_blocked_trajectory_tells_that_it_began_at_the_start(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("hrsynth.kinematics.continuation.track", lambda here, motion, goal: (here, 0.5))
-    with pytest.raises(PoseNotReached, match="from the start the robot gets"):
+    with pytest.raises(PoseReachFailure, match="from the start the robot gets"):
         servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0,z=-0.6", duration=2.0)
 
 
@@ -257,7 +257,7 @@ def test_a_bias_holds_the_platform_where_the_measured_directions_are_the_desired
 def test_a_joint_limit_is_a_boundary():
     robot = load("delta")
     free = servo(robot, start="x=0,y=0,z=-0.6", goal="x=0.1,y=0.1,z=-0.65")
-    joint = next(j for j in robot.joints.values() if j.actuated)
+    joint = next(j for j in robot.joints.values() if j.is_actuated)
     model = free.run.last.model
     way = [model.difference(model.q0, at.q)[model.coordinates[joint.name][0]] for at in free.run.configurations]
     half = (way[0] + way[-1]) / 2
@@ -335,8 +335,8 @@ def test_a_noisy_run_that_meets_a_limit_is_over():
 
 
 REFUSED: list[tuple[str, Callable[[], object], type[Exception], str]] = [
-    ("goal out of reach", lambda: servo(load("delta"), start="x=0", goal="x=9"), PoseNotReached, "x=9"),
-    ("start out of reach", lambda: servo(load("delta"), start="x=9", goal="x=0"), PoseNotReached, "x=9"),
+    ("goal out of reach", lambda: servo(load("delta"), start="x=0", goal="x=9"), PoseReachFailure, "x=9"),
+    ("start out of reach", lambda: servo(load("delta"), start="x=9", goal="x=0"), PoseReachFailure, "x=9"),
     ("too few legs", lambda: servo(load("delta"), "1", start="x=0", goal="x=0.1"), BadRequest, "do not see"),
     ("unknown leg", lambda: servo(load("delta"), "7", start="x=0", goal="x=0.1"), BadRequest, "'7'"),
     ("no gain", lambda: servo(load("delta"), start="x=0", goal="x=0.1", gain=0.0), BadRequest, "gain"),
@@ -371,7 +371,7 @@ REFUSED: list[tuple[str, Callable[[], object], type[Exception], str]] = [
 def test_what_does_not_fit_is_refused_in_one_line(call: Callable[[], object], error: type[Exception], words: str):
     with pytest.raises(error, match=words) as raised:
         call()
-    assert getattr(raised.value, "exit_status", None) == (3 if error is PoseNotReached else 2)
+    assert getattr(raised.value, "exit_status", None) == (3 if error is PoseReachFailure else 2)
     assert len(str(raised.value).splitlines()) == 1
 
 
@@ -391,7 +391,7 @@ def test_robots_that_are_not_controllable_are_refused(name: str):
 
 def test_every_reached_pose_is_a_start():
     found = setting("delta")
-    at = reach(
+    at = track_to_pose(
         found.all_samples.start, found.all_samples.observation_model, found.motion.pose(found.motion.home), found.motion
     )
     assert run_between("delta", at, at).outcome == GOAL

@@ -14,8 +14,8 @@ from hrsynth.errors import BadRequest
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.chart import TangentChart
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.present.runs import _picture
-from hrsynth.present.view.sights import eyes, half_picture
+from hrsynth.present.runs import _draw_image
+from hrsynth.present.view.sights import compute_half_image, list_cameras
 from hrsynth.simulation.law import Law, measure_all, supposed_planes
 from hrsynth.simulation.result import Servo
 from simulation.scenes import setting
@@ -191,11 +191,11 @@ def test_noise_is_told_in_the_unit_in_which_it_is_given(
 def test_the_picture_of_a_camera_with_a_size_is_all_of_it(recwarn: pytest.WarningsRecorder) -> None:
     """Matplotlib says so where it does not keep the limits that it is given."""
     setup = hrsynth.observe("gough_stewart", camera=SIZED, sensor=POINTS)
-    eye = replace(next(each for each in eyes(setup) if each.name == "eye"), width=640, height=480)
+    eye = replace(next(each for each in list_cameras(setup) if each.name == "eye"), width=640, height=480)
     found = hrsynth.servo(setup, start=GOAL, goal=GOAL, time=0.4)
     place = Figure((6, 2)).add_axes((0.1, 0.1, 0.8, 0.8))
-    half = half_picture(eye)
-    _picture(place, found, eye, half)
+    half = compute_half_image(eye)
+    _draw_image(place, found, eye, half)
     place.figure.canvas.draw()
     assert not [each for each in recwarn if "limits" in str(each.message)]
     np.testing.assert_allclose([place.get_xlim(), place.get_ylim()], [[-half[0], half[0]], [half[1], -half[1]]])

@@ -10,20 +10,20 @@ from typing import Annotated, Literal, NotRequired, TypedDict
 
 import numpy as np
 
-from ..description.observation_text import offers, split_offers
-from ..errors import BadRequest, HrsynthError, RankUndecided
+from ..description.observation_text import expand_candidates, split_offers
+from ..errors import BadRequest, HrsynthError, UndecidedRank
 from ..geometry import lines
-from ..geometry.ranks import kernel_basis, largest_angle, range_basis, singular_values
+from ..geometry.ranks import compute_kernel_basis, compute_largest_angle, compute_range_basis, compute_singular_values
 from ..geometry.vectors import Array
 from ..kinematics.sampling import Samples
 from ..mechanism import Direction, Joint, JointType, Mechanism, Observation
-from ..mechanism.observations import kinds
-from ..mechanism.sensors import encoders, observation_of, observed_line
-from ..options import OBSERVATION, option, plain_number
+from ..mechanism.observations import list_kinds
+from ..mechanism.sensors import locate_observed_line, make_encoders, observe_segment
+from ..options import OBSERVATION, option, parse_plain_number
 from ..progress import report
 from ..records import FLAT, GAP, OPTIONAL, As, Recorded, Shown, Word, recorded
 from ..results import Result, Value
-from ..tolerances import RANK_CUTOFF, SAME_PRICE, SAME_RELATION
+from ..tolerances import COST_DIFFERENCE_TOL, RANK_CUTOFF_FRACTION, RELATION_ANGLE_TOL
 from .analysis_declaration import analysis
 from .freedoms import Freedom
 from .observed import (
@@ -33,11 +33,11 @@ from .observed import (
     RobotLike,
     Seed,
     SeeLike,
-    as_robot,
-    as_texts,
+    normalise_texts,
+    read_robot,
     restrict_samples,
 )
-from .verdict import AT_REST, CONTROLLABLE, Verdict, verdict_of
+from .verdict import AT_REST, CONTROLLABLE, Verdict, compute_verdict
 
 AXES = {JointType.UNIVERSAL: ("first", "second"), JointType.CYLINDRICAL: ("slide", "turn")}
 """The names of the coordinates of joints that have two."""
@@ -90,25 +90,25 @@ class FurtherMeasurement(Value):
         return {**record, "link": seen["link"], "at": seen["at"], "axis": seen["axis"]}
 
 
-def candidates(setup: ObservedRobot, offered: Sequence[str] = ()) -> tuple[FurtherMeasurement, ...]:
+def list_candidates(setup: ObservedRobot, offered: Sequence[str] = ()) -> tuple[FurtherMeasurement, ...]:
     """Return all candidates: legs, directions of other links, positions of observed lines, encoders, and those of
     ``offered``, in the form of ``--sensor``."""
     more = [
         FurtherMeasurement("offered", text, each, each.leg) for text, each in zip(offered, setup.offered, strict=True)
     ]
-    return (*_legs(setup), *_directions(setup), *_lines(setup), *_encoders(setup), *more)
+    return (*_list_legs(setup), *_list_directions(setup), *_list_lines(setup), *_list_encoders(setup), *more)
 
 
-def _legs(setup: ObservedRobot) -> Iterator[FurtherMeasurement]:
+def _list_legs(setup: ObservedRobot) -> Iterator[FurtherMeasurement]:
     for segment in setup.segments:
         if segment.leg not in setup.labels:
             yield FurtherMeasurement("leg", segment.leg, segment, segment.leg)
 
 
-def _directions(setup: ObservedRobot) -> Iterator[FurtherMeasurement]:
+def _list_directions(setup: ObservedRobot) -> Iterator[FurtherMeasurement]:
     """Segments of all legs but the observed ones and those that a leg is, along the directions that the file
     names where it does; links without a direction are left out."""
-    taken = {o.key for o in setup.observed} | {each.observation.key for each in _legs(setup)}
+    taken = {o.key for o in setup.observed} | {each.observation.key for each in _list_legs(setup)}
     named = {o.key: o for o in setup.all_legs}
     for leg in setup.decomposition.legs:
         ends = (setup.mechanism.platform,) if leg.takes_platform else ()
@@ -119,51 +119,51 @@ def _directions(setup: ObservedRobot) -> Iterator[FurtherMeasurement]:
                 yield FurtherMeasurement(
                     "direction",
                     link,
-                    named.get((leg.label, link)) or observation_of(setup.decomposition, link),
+                    named.get((leg.label, link)) or observe_segment(setup.decomposition, link),
                     leg.label,
                 )
             except HrsynthError:
                 continue
 
 
-def _lines(setup: ObservedRobot) -> Iterator[FurtherMeasurement]:
+def _list_lines(setup: ObservedRobot) -> Iterator[FurtherMeasurement]:
     for seen in setup.observed:
         if isinstance(seen, Direction):
-            yield FurtherMeasurement("line", seen.link, observed_line(setup.decomposition, seen), seen.leg)
+            yield FurtherMeasurement("line", seen.link, locate_observed_line(setup.decomposition, seen), seen.leg)
 
 
-def _encoders(setup: ObservedRobot) -> Iterator[FurtherMeasurement]:
+def _list_encoders(setup: ObservedRobot) -> Iterator[FurtherMeasurement]:
     """Encoders on all joints of the normal form, those with motors first; joints between links of an articulated
     platform are of no leg."""
     decomposition = setup.decomposition
     owner = {joint: leg.label for leg in decomposition.legs for joint in leg.joints}
-    for joint in sorted(decomposition.mechanism.joints.values(), key=lambda joint: not joint.actuated):
+    for joint in sorted(decomposition.mechanism.joints.values(), key=lambda joint: not joint.is_actuated):
         leg = owner.get(joint.name)
-        for number, encoder in enumerate(encoders(decomposition.mechanism, joint, leg or "")):
+        for number, encoder in enumerate(make_encoders(decomposition.mechanism, joint, leg or "")):
             axis = AXES[joint.type][number] if joint.type in AXES else None
-            if turned := _joints_behind(setup, joint, number):
-                yield FurtherMeasurement("encoder", " and ".join(turned), encoder, leg, None, joint.actuated)
+            if turned := _list_file_joints(setup, joint, number):
+                yield FurtherMeasurement("encoder", " and ".join(turned), encoder, leg, None, joint.is_actuated)
             else:
-                yield FurtherMeasurement("encoder", joint.name, encoder, leg, axis, joint.actuated)
+                yield FurtherMeasurement("encoder", joint.name, encoder, leg, axis, joint.is_actuated)
 
 
-def _joints_behind(setup: ObservedRobot, joint: Joint, number: int) -> list[str]:
+def _list_file_joints(setup: ObservedRobot, joint: Joint, number: int) -> list[str]:
     """The joints of the file of which a joint of the normal form is made, those about its axis of this number; none
     where it is one of the file."""
     axis = joint.axes[min(number, len(joint.axes) - 1)]
     made = [setup.robot.joints[name] for name in setup.normal.made_of.get(joint.name, ())]
-    return [each.name for each in made if len(each.axes) == 1 and lines.parallel(each.axis, axis)]
+    return [each.name for each in made if len(each.axes) == 1 and lines.is_parallel(each.axis, axis)]
 
 
-PROBES = 3
+ADVICE_PROBES_COUNT = 3
 """Configurations at which all sets are tried; what sees most there is verified at all samples."""
-LARGEST_SIZE = 4
+ADVICE_SET_SIZE_MAX = 4
 """Number of observations in the largest sets that are tried."""
 LARGEST_COUNT = 20000
 """Sets of one size that are tried."""
-LARGEST_VALUE = 6
+MEASURED_VALUE_ROWS_MAX = 6
 """Rows of the largest measured value."""
-BATCH = 2000
+ADVICE_BATCH_COUNT = 2000
 """Sets that are tried at once."""
 
 
@@ -224,7 +224,7 @@ class Advice(Result, shown_as="advise"):
         return self.now.verdict in (CONTROLLABLE, AT_REST)
 
     @property
-    def cured(self) -> bool:
+    def has_sufficient_sets(self) -> bool:
         """True if the sets make the robot controllable."""
         return bool(self.sets) and self.sets[0].verdict.verdict == CONTROLLABLE
 
@@ -312,7 +312,7 @@ def advise(
     ------
     BadRequest
         For unknown names.
-    RankUndecided
+    UndecidedRank
         If the present rank has no clear gap.
 
     Notes
@@ -325,20 +325,23 @@ def advise(
     >>> hrsynth.advise("3rrr_m1", "1,2")
     <Advice: 3rrr_m1, observing 1, 2: partially controllable, 15 sets of 1 more>
     """
-    robot = as_robot(robot)
+    robot = read_robot(robot)
     length = (robot if isinstance(robot, Mechanism) else robot.robot).length
     offered = [
-        each for text in as_texts(candidate_sensor) for one in split_offers(text) for each in offers(one, length)
+        each
+        for text in normalise_texts(candidate_sensor)
+        for one in split_offers(text)
+        for each in expand_candidates(one, length)
     ]
     setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, candidate_sensor=offered or None, seed=seed)
-    prices = _prices(cost)
-    now = verdict_of(setup, setup.labels, setup.samples)
+    prices = _parse_costs(cost)
+    now = compute_verdict(setup, setup.labels, setup.samples)
     if now.verdict in (CONTROLLABLE, AT_REST):
         return Advice(setup, now, (), 0, True)
-    all_samples = candidates(setup, offered)
+    all_samples = list_candidates(setup, offered)
     samples = setup.measuring((*setup.observed, *(each.observation for each in all_samples)))
     search = Search(samples, len(setup.observed), all_samples)
-    costs = [prices.get(_kind(each), 1.0) for each in search.useful]
+    costs = [prices.get(_name_kind(each), 1.0) for each in search.useful]
     chosen, complete = search.cheapest(costs)
     report("verification")
     sets = _verify(
@@ -352,14 +355,14 @@ def advise(
     return Advice(setup, now, kept, search.tried, complete and not undecided, undecided)
 
 
-def _kind(measurement: FurtherMeasurement) -> str:
+def _name_kind(measurement: FurtherMeasurement) -> str:
     """Return the kind by which a cost is given."""
     return measurement.observation.kind if measurement.kind == "offered" else measurement.kind
 
 
-def _prices(text: str) -> dict[str, float]:
+def _parse_costs(text: str) -> dict[str, float]:
     """Return the cost of one observation of each kind; raises ``BadRequest``."""
-    allowed = sorted({"leg", "direction", "line", "encoder", *kinds()})
+    allowed = sorted({"leg", "direction", "line", "encoder", *list_kinds()})
     found: dict[str, float] = {}
     for part in filter(None, text.split(",")):
         kind, _, number = part.partition("=")
@@ -368,7 +371,7 @@ def _prices(text: str) -> dict[str, float]:
         if kind in found:
             raise BadRequest(f"--cost {text}: {kind} is given twice", remedy="Omit one.")
         try:
-            found[kind] = plain_number(number)
+            found[kind] = parse_plain_number(number)
         except ValueError:
             found[kind] = np.nan
         if not 0 < found[kind] < np.inf:
@@ -384,9 +387,9 @@ def _verify(
     for added, cost in sets:
         watched = (*setup.observed, *(each.observation for each in added))
         try:
-            verdict = verdict_of(setup, setup.labels, restrict_samples(samples, watched, ways=False))
+            verdict = compute_verdict(setup, setup.labels, restrict_samples(samples, watched, ways=False))
             found.append(SensorSuggestion(added, verdict, cost))
-        except RankUndecided:
+        except UndecidedRank:
             continue
     return found
 
@@ -404,18 +407,20 @@ class Search:
         rates: list[list[Array]] = []
         self._twists: list[Array] = []
         unseen: list[list[Array]] = []
-        for member in samples.members[:PROBES]:
+        for member in samples.members[:ADVICE_PROBES_COUNT]:
             found = member.relation
             known = found.basis[found.twist_rows : found.rows_of(observed).start]
-            N = kernel_basis(known, 1.0)[0]
+            N = compute_kernel_basis(known, 1.0)[0]
             self._twists.append(found.twist_part @ N)
             rates.append([found.basis[found.rows_of(observed + i)] for i in kept])
             unseen.append([block @ N for block in rates[-1]])
-        kept = [i for i in kept if max(float(np.linalg.norm(blocks[i])) for blocks in unseen) > RANK_CUTOFF]
-        kept = _without_twins(kept, all_samples, rates)
+        kept = [i for i in kept if max(float(np.linalg.norm(blocks[i])) for blocks in unseen) > RANK_CUTOFF_FRACTION]
+        kept = _drop_duplicates(kept, all_samples, rates)
         self.useful = tuple(all_samples[i] for i in kept)
         self._rows = [
-            np.array([_pad_rows(blocks[i]) for i in kept]).reshape(len(kept), LARGEST_VALUE, twist.shape[1])
+            np.array([_extend_rows(blocks[i]) for i in kept]).reshape(
+                len(kept), MEASURED_VALUE_ROWS_MAX, twist.shape[1]
+            )
             for blocks, twist in zip(unseen, self._twists, strict=True)
         ]
 
@@ -427,7 +432,7 @@ class Search:
         for rows, twist in zip(self._rows, self._twists, strict=True):
             seen = rows[places].reshape(len(places), -1, twist.shape[1])
             both = np.concatenate([seen, np.broadcast_to(twist, (len(places), *twist.shape))], axis=1)
-            found.append(_ranks(both) - _ranks(seen))
+            found.append(_compute_ranks(both) - _compute_ranks(seen))
         return np.min(found, axis=0)
 
     def cheapest(self, costs: Sequence[float]) -> tuple[list[tuple[int, ...]], bool]:
@@ -441,18 +446,18 @@ class Search:
             return [], True
         best, lowest, chosen, complete = np.inf, np.inf, list[tuple[int, ...]](), True
         for size in range(1, count + 1):
-            if best == least and np.sort(prices)[:size].sum() > lowest * (1 + SAME_PRICE):
+            if best == least and np.sort(prices)[:size].sum() > lowest * (1 + COST_DIFFERENCE_TOL):
                 return chosen, complete
-            if size > LARGEST_SIZE:
+            if size > ADVICE_SET_SIZE_MAX:
                 break
             complete = complete and comb(count, size) <= LARGEST_COUNT
             sets = islice(combinations(range(count), size), LARGEST_COUNT)
-            while batch := list(islice(sets, BATCH)):
+            while batch := list(islice(sets, ADVICE_BATCH_COUNT)):
                 report(f"sets of {size}")
                 self.tried += len(batch)
                 costs = prices[np.array(batch)].sum(axis=1)
                 for each, rest, cost in zip(batch, self.count_lost(batch), costs, strict=True):
-                    same = rest == best and abs(cost - lowest) <= SAME_PRICE * lowest
+                    same = rest == best and abs(cost - lowest) <= COST_DIFFERENCE_TOL * lowest
                     if not same and (rest, cost) < (best, lowest):
                         best, lowest, chosen = int(rest), float(cost), []
                     if same or not chosen:
@@ -462,12 +467,12 @@ class Search:
         return chosen, False
 
 
-def _without_twins(
+def _drop_duplicates(
     kept: Sequence[int], all_samples: Sequence[FurtherMeasurement], rates: Sequence[Sequence[Array]]
 ) -> list[int]:
     """Leave out a link's direction whose rates equal those of one before it (links joined by P joints only)."""
     spans = {
-        i: [range_basis(blocks[i].T, 1.0)[0] for blocks in rates]
+        i: [compute_range_basis(blocks[i].T, 1.0)[0] for blocks in rates]
         for i in kept
         if all_samples[i].kind in ("leg", "direction")
     }
@@ -475,17 +480,18 @@ def _without_twins(
     for i in kept:
         twins = (j for j in left if j in spans) if all_samples[i].kind == "direction" else ()
         if not any(
-            all(largest_angle(a, b) < SAME_RELATION for a, b in zip(spans[i], spans[j], strict=True)) for j in twins
+            all(compute_largest_angle(a, b) < RELATION_ANGLE_TOL for a, b in zip(spans[i], spans[j], strict=True))
+            for j in twins
         ):
             left.append(i)
     return left
 
 
-def _pad_rows(block: Array) -> Array:
+def _extend_rows(block: Array) -> Array:
     """The rows of a candidate, zero rows added up to those of the largest."""
-    return np.vstack([block, np.zeros((LARGEST_VALUE - len(block), block.shape[1]))])
+    return np.vstack([block, np.zeros((MEASURED_VALUE_ROWS_MAX - len(block), block.shape[1]))])
 
 
-def _ranks(matrices: Array) -> Array:
+def _compute_ranks(matrices: Array) -> Array:
     """The rank of each matrix (k, rows, columns), zero relative to one or to its largest singular value; shape (k,)."""
-    return np.asarray(np.sum(singular_values(matrices) > RANK_CUTOFF, axis=1))
+    return np.asarray(np.sum(compute_singular_values(matrices) > RANK_CUTOFF_FRACTION, axis=1))

@@ -14,12 +14,12 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from ..budgets import REMEMBERED_ANSWERS, REMEMBERED_GRIDS
+from ..budgets import CACHED_GRID_RESULTS_COUNT, CACHED_RESULTS_COUNT
 from ..errors import BadRequest, MissingExtra
 from ..mechanism import Mechanism
-from ..options import Option, kinds_of, options_of, plain_signature, require_range
-from ..results import content, require_keywords
-from .observed import as_robot, forget_robots, legs_asked
+from ..options import Option, list_options, list_parameter_types, require_range, strip_annotations
+from ..results import freeze_content, require_keywords
+from .observed import clear_robots, list_requested_legs, read_robot
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -70,7 +70,7 @@ class AnswerMemory:
         return found
 
 
-_ANSWERS, _GRIDS = AnswerMemory(REMEMBERED_ANSWERS), AnswerMemory(REMEMBERED_GRIDS)
+_ANSWERS, _GRIDS = AnswerMemory(CACHED_RESULTS_COUNT), AnswerMemory(CACHED_GRID_RESULTS_COUNT)
 
 
 def clear_cache() -> None:
@@ -80,11 +80,11 @@ def clear_cache() -> None:
     --------
     >>> hrsynth.clear_cache()
     """
-    forget_answers()
-    forget_robots()
+    clear_results()
+    clear_robots()
 
 
-def forget_answers() -> None:
+def clear_results() -> None:
     """Clear the results alone."""
     for memory in (_ANSWERS, _GRIDS):
         memory.kept.clear()
@@ -119,8 +119,8 @@ def analysis(
 
     def made(function: Callable[P, R]) -> Callable[P, R]:
         known = signature(function)
-        options = tuple(options_of(function))
-        kinds = kinds_of(function)
+        options = tuple(list_options(function))
+        kinds = list_parameter_types(function)
         by_name = {each.name: each for each in options}
         summary = " ".join((function.__doc__ or "").partition("\n\n")[0].split())
 
@@ -142,7 +142,7 @@ def analysis(
             except TypeError as error:
                 raise TypeError(f"{function.__name__}: {error}; it takes {', '.join(known.parameters)}") from None
             require_kinds(kinds, by_name, bound.arguments)
-            robot = bound.arguments["robot"] = as_robot(bound.arguments["robot"])
+            robot = bound.arguments["robot"] = read_robot(bound.arguments["robot"])
             source = robot if isinstance(robot, Mechanism) else robot.robot
             if source.formation and not formations:
                 raise BadRequest(
@@ -155,8 +155,8 @@ def analysis(
             every = known.bind(*args, **given)
             every.apply_defaults()
             if "observe" in (values := every.arguments):
-                values["observe"] = legs_asked(robot, values["observe"], values.get("sensor"))
-            told = [(name, content(value)) for name, value in every.arguments.items() if name != "robot"]
+                values["observe"] = list_requested_legs(robot, values["observe"], values.get("sensor"))
+            told = [(name, freeze_content(value)) for name, value in every.arguments.items() if name != "robot"]
             key = (function.__qualname__, robot, source.file, source.notes, source.options, source.sha256, *told)
             try:
                 hash(key)
@@ -165,7 +165,7 @@ def analysis(
             large = any(given.get(name) is not None for name in ("plane", "grid"))
             return (_GRIDS if large else _ANSWERS).answer(key, lambda: function(*bound.args, **bound.kwargs))
 
-        asked.__signature__ = plain_signature(function)  # type: ignore[attr-defined]
+        asked.__signature__ = strip_annotations(function)  # type: ignore[attr-defined]
         asked.declaration = Declaration(place, summary, options, examples, seeded)  # type: ignore[attr-defined]
         return asked
 

@@ -8,19 +8,27 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from ..batch.pose_continuation import grid_dependence, sweep
-from ..errors import BadMechanism, NoPlatform, NoReachablePose, NoSegment, NotSampled, PoseNotReached, RankUndecided
+from ..batch.pose_continuation import explain_grid_dependence, sweep
+from ..errors import (
+    BadMechanism,
+    NoPlatform,
+    NoReachablePose,
+    NoSegment,
+    PoseReachFailure,
+    SamplingFailure,
+    UndecidedRank,
+)
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.operation_modes import STEPS, firmest, require_motions
+from ..kinematics.operation_modes import SAMPLE_PATH_STEPS_COUNT, choose_firmest, require_motions
 from ..kinematics.pinocchio_model import PinocchioModel
-from ..kinematics.walking import random_walk
+from ..kinematics.walking import walk_randomly
 from ..mechanism import Mechanism
-from ..mechanism.pose import Grid, PoseLike, asked_poses
+from ..mechanism.pose import Grid, PoseLike, parse_poses
 from ..options import option
 from ..progress import report
 from ..records import FLAT, GAP, As, Recorded, Shown, Table, recorded
 from ..results import Result, Value
-from ..tolerances import RANK_GAP
+from ..tolerances import RANK_GAP_MIN
 from .analysis_declaration import analysis
 from .configuration_report import ConfigurationAnalysis, ConfigurationReport
 from .observed import (
@@ -37,8 +45,8 @@ from .observed import (
     Seed,
     SeeLike,
 )
-from .pose_requests import asked_at, require_platform
-from .singularity_indices import Redundancy, list_redundant, usual_rows
+from .pose_requests import require_platform, solve_requested_poses
+from .singularity_indices import Redundancy, find_generic_rows, list_redundant
 
 UNREACHABLE = "unreachable"
 MEASURES = ("type2", "type1", "constraints", "condition", "mm_per_degree", "degrees_per_degree")
@@ -78,7 +86,7 @@ class GridCheck(Value):
     degrees_per_degree = Shown(Table, lambda self: self.nested(self.values("degrees_per_degree")))
 
 
-class Unreached(NamedTuple):
+class UnreachedPose(NamedTuple):
     """A requested pose, as it was written, and why it is not reached."""
 
     pose: str
@@ -107,7 +115,7 @@ class Check(Result, shown_as="check"):
     postures: Annotated[tuple[ConfigurationReport, ...], As("configurations")]
     redundant: Recorded[tuple[Redundancy, ...]]
     grid: Recorded[GridCheck | None] = None
-    unreached: tuple[PoseNotReached, ...] = ()
+    unreached: tuple[PoseReachFailure, ...] = ()
     """Requested poses that the robot does not reach, with the reason."""
 
     @property
@@ -122,12 +130,12 @@ class Check(Result, shown_as="check"):
         return self.setup.mobility_if_written
 
     def require_answered(self, at: Any = None, **asked: Any) -> None:
-        """Raise ``RankUndecided`` or ``PoseNotReached`` for requested poses."""
+        """Raise ``UndecidedRank`` or ``PoseReachFailure`` for requested poses."""
         for posture in self.postures if at else ():
-            if not posture.decided:
-                raise RankUndecided(f"{self.setup.robot.name} at {posture.pose}", posture.gap, RANK_GAP)
+            if not posture.has_decided_ranks:
+                raise UndecidedRank(f"{self.setup.robot.name} at {posture.pose}", posture.gap, RANK_GAP_MIN)
         if self.unreached:
-            raise PoseNotReached.of_all(self.unreached)
+            raise PoseReachFailure.of_all(self.unreached)
 
     def headline(self) -> str:
         """The robot, and the state of its hidden robot at each pose."""
@@ -141,7 +149,9 @@ class Check(Result, shown_as="check"):
         return f"{self.setup.headline()}: {'; '.join(states)}"
 
     unreached_record = Shown(
-        list[Unreached], lambda self: [Unreached(each.pose, each.reason) for each in self.unreached], As("unreached")
+        list[UnreachedPose],
+        lambda self: [UnreachedPose(each.pose, each.reason) for each in self.unreached],
+        As("unreached"),
     )
     observations = Shown(list[ObservedAxis], lambda self: self.setup.observed_record)
     mobility = Shown(MobilityWritten, lambda self: self.setup.mobilities)
@@ -192,19 +202,21 @@ class LoopCheck(Result, shown_as="loop_check"):
 
     @classmethod
     def of(cls, robot: Mechanism, why: str) -> LoopCheck:
-        """Return the loop check of a mechanism, and ``why`` no more is possible; raises ``NotSampled``,
-        ``RankUndecided``, ``InfinitesimalMobility``."""
+        """Return the loop check of a mechanism, and ``why`` no more is possible; raises ``SamplingFailure``,
+        ``UndecidedRank``, ``InfinitesimalMobility``."""
         model = PinocchioModel(robot)
         start = ClosedConfiguration.of(model, model.q0)
         names, sizes = model.blocks
         moves = bool(names) and start.kernel()[0].shape[1] > 0
-        found = list(random_walk(start, 2 * STEPS, steps=STEPS)) if moves else [start]
+        found = (
+            list(walk_randomly(start, 2 * SAMPLE_PATH_STEPS_COUNT, steps=SAMPLE_PATH_STEPS_COUNT)) if moves else [start]
+        )
         if moves:
             require_motions(found)
-        kernel, rank = firmest(found).kernel()
+        kernel, rank = choose_firmest(found).kernel()
         rank.decided(f"{robot.name}: the constraints of its loops")
         told = LoopRank(names, model.nv, sum(sizes), rank.value, rank.gap, rank.weakest, rank.dropped)
-        redundant = list_redundant(usual_rows(found), generic=True)
+        redundant = list_redundant(find_generic_rows(found), generic=True)
         more = (why, *([robot.proposed_motors] if robot.proposed_motors else []))
         return cls(robot, LoopMobility(kernel.shape[1]), told, redundant, more)
 
@@ -282,7 +294,7 @@ def check(
     ------
     BadRequest
         For unknown names, and for parts of a pose that the platform cannot change.
-    PoseNotReached, NoReachablePose
+    PoseReachFailure, NoReachablePose
         If no pose, or none of the grid, is reached.
 
     Notes
@@ -296,11 +308,11 @@ def check(
     >>> hrsynth.check("3rrr_m1", at=["x=0,y=0,phi=0", [0.01, 0, 0]])
     <Check: 3rrr_m1, observing 1, 2, 3: x=0,y=0,z=0,phi=0deg regular; x=0.01,y=0,z=0,phi=0deg regular>
     """
-    poses = asked_poses(at)
+    poses = parse_poses(at)
     cells = None if grid is None else Grid.parse(grid)
     try:
         setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed).telling(poses)
-    except (NoPlatform, NoSegment, BadMechanism, NotSampled) as error:
+    except (NoPlatform, NoSegment, BadMechanism, SamplingFailure) as error:
         if (
             not isinstance(robot, Mechanism)
             or poses
@@ -310,18 +322,18 @@ def check(
         return LoopCheck.of(robot, str(error).removeprefix(f"{robot.file or robot.name}: "))
     examiner = ConfigurationAnalysis.of(setup)
     start, observation_model, motion = setup.all_samples.start, setup.all_samples.observation_model, setup.motion
-    found = asked_at(setup, poses) or [start]
+    found = solve_requested_poses(setup, poses) or [start]
     configurations = [each for each in found if isinstance(each, ClosedConfiguration)]
-    unreached = tuple(each for each in found if isinstance(each, PoseNotReached))
+    unreached = tuple(each for each in found if isinstance(each, PoseReachFailure))
     if not configurations:
-        raise PoseNotReached.of_all(unreached)
+        raise PoseReachFailure.of_all(unreached)
     report("poses")
     postures = tuple(map(examiner.examine, configurations))
     swept = None
     if cells is not None:
         require_platform(setup.robot, cells)
         places = sweep(start, observation_model, cells, motion, setup.placer)
-        dependent = None if all(places) else grid_dependence(start, motion, cells)
+        dependent = None if all(places) else explain_grid_dependence(start, motion, cells)
         if not any(places):
             raise NoReachablePose(setup.robot.name, f"the grid {cells}", f"none of {len(places)} is", dependent)
         swept = GridCheck(

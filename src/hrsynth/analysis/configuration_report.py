@@ -8,17 +8,17 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from ..budgets import REMEMBERED
+from ..budgets import CACHED_OBSERVED_ROBOTS_COUNT
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.joint_coordinates import OfConfiguration
-from ..kinematics.limits import flat_wrists, outside
-from ..kinematics.velocity_relation import VelocityRelation, relation, relation_of
+from ..kinematics.limits import find_flat_tilts, list_joints_beyond
+from ..kinematics.velocity_relation import VelocityRelation, compute_relation, compute_relation_of_rows
 from ..mechanism.pose import Pose
 from ..records import OPTIONAL, As, Number, Record, Recorded, Shown, recorded
 from ..results import Value
-from ..tolerances import PASSED_BY, RANK_GAP
-from .formation import Formation, formation_at, special_at
+from ..tolerances import RANK_GAP_MIN, WAYPOINT_RESIDUAL_TOL
+from .formation import Formation, analyze_formation, describe_degeneracy
 from .freedoms import Freedom, name_freedoms
 from .observed import Mobility, ObservedRobot
 from .singularity_indices import (
@@ -26,13 +26,13 @@ from .singularity_indices import (
     Redundancy,
     Rows,
     SingularityIndices,
-    gap_of,
-    generic,
-    interaction_matrix,
+    compute_interaction_matrix,
+    count_redundant_rows,
+    find_generic_counts,
+    find_generic_rows,
+    find_smallest_gap,
     list_redundant,
-    redundant_rows,
-    surplus,
-    usual_rows,
+    subtract_generic_rows,
 )
 
 UNDECIDED, REGULAR, CONSTRAINT = "undecided", "regular", "constraint"
@@ -60,7 +60,7 @@ class SingularityReport(Value, all_recorded=True):
             return UNDECIDED
         if found.IIM > 0:
             return CONSTRAINT
-        return "type3" if found.type3 else "type2" if found.type2 else "type1" if found.type1 else REGULAR
+        return "type3" if found.is_type3 else "type2" if found.is_type2 else "type1" if found.is_type1 else REGULAR
 
 
 @dataclass(frozen=True)
@@ -121,14 +121,14 @@ class ConfigurationReport(OfConfiguration, Value):
     @recorded()
     def beyond_limits(self) -> tuple[str, ...]:
         """The joints that are beyond their limits."""
-        return tuple(outside(self.configuration.model, self.configuration.q))
+        return tuple(list_joints_beyond(self.configuration.model, self.configuration.q))
 
     @cached_property
     @recorded()
     def singular_spherical_joints(self) -> dict[str, float]:
         """S joints that replace several R which are (nearly, rad) at a singularity of their own, which the S does not
         have (docs/pages/theory.md, section 1)."""
-        return flat_wrists(self.configuration.model, self.configuration.q)
+        return find_flat_tilts(self.configuration.model, self.configuration.q)
 
     @property
     def gap(self) -> float:
@@ -136,9 +136,9 @@ class ConfigurationReport(OfConfiguration, Value):
         return self.hidden.gap if self.real is None else min(self.hidden.gap, self.real.gap)
 
     @property
-    def decided(self) -> bool:
+    def has_decided_ranks(self) -> bool:
         """True if every rank has a clear gap."""
-        return self.gap >= RANK_GAP
+        return self.gap >= RANK_GAP_MIN
 
     @property
     def constraint_singular(self) -> bool | None:
@@ -153,7 +153,7 @@ class ConfigurationAnalysis(Value):
     setup: ObservedRobot
 
     @classmethod
-    @lru_cache(maxsize=REMEMBERED)
+    @lru_cache(maxsize=CACHED_OBSERVED_ROBOTS_COUNT)
     def of(cls, setup: ObservedRobot) -> ConfigurationAnalysis:
         """The one of an observed robot: its generic values are computed once."""
         return cls(setup)
@@ -161,31 +161,33 @@ class ConfigurationAnalysis(Value):
     @cached_property
     def usual(self) -> Counts:
         """The generic counts of the observed directions."""
-        return generic([Counts.of(member.relation) for member in self.setup.samples.members])
+        return find_generic_counts([Counts.of(member.relation) for member in self.setup.samples.members])
 
     @cached_property
     def usual_real(self) -> Counts:
         """The generic counts of the motors."""
-        return generic([Counts.of(self._real(at)) for at in self.setup.configurations])
+        return find_generic_counts([Counts.of(self._real(at)) for at in self.setup.configurations])
 
     @cached_property
     def redundant(self) -> Rows:
         """The redundant rows of each loop in general."""
-        return usual_rows(self.setup.configurations)
+        return find_generic_rows(self.setup.configurations)
 
     @cached_property
-    def _usually_special(self) -> bool:
+    def _is_always_degenerate(self) -> bool:
         """True if all observed points of a formation lie in a line or plane at every configuration."""
-        return all(special_at(at, self.setup.samples.observation_model) for at in self.setup.configurations)
+        return all(describe_degeneracy(at, self.setup.samples.observation_model) for at in self.setup.configurations)
 
     def _real(self, at: ClosedConfiguration) -> VelocityRelation:
-        return relation_of(at, self.setup.samples.observation_model, np.eye(at.model.nv)[at.model.actuated_indices()])
+        return compute_relation_of_rows(
+            at, self.setup.samples.observation_model, np.eye(at.model.nv)[at.model.actuated_indices()]
+        )
 
     def classify(self, at: ClosedConfiguration) -> ConfigurationReport:
         """Report without names: no dof, no redundant constraints."""
         setup = self.setup
-        found = relation(at, setup.samples.observation_model)
-        told = relation(at, replace(setup.all_samples.observation_model, observations=setup.telling_idle))
+        found = compute_relation(at, setup.samples.observation_model)
+        told = compute_relation(at, replace(setup.all_samples.observation_model, observations=setup.telling_idle))
         real = self._kinds(self._real(at), self.usual_real) if at.model.actuated_indices() else None
         mobility = Mobility(found.mobility, found.mobility - told.dimension)
         return ConfigurationReport(
@@ -202,12 +204,14 @@ class ConfigurationAnalysis(Value):
         """Return the full report on a configuration."""
         posture = self.classify(at)
         hidden, real = posture.hidden, posture.real
-        found = relation(at, self.setup.samples.observation_model)
+        found = compute_relation(at, self.setup.samples.observation_model)
         if self.setup.mechanism.formation:
-            here = formation_at(at, self.setup.samples.observation_model, found, self.setup.decomposition)
-            if (special := special_at(at, self.setup.samples.observation_model)) and not self._usually_special:
+            here = analyze_formation(at, self.setup.samples.observation_model, found, self.setup.decomposition)
+            if (
+                special := describe_degeneracy(at, self.setup.samples.observation_model)
+            ) and not self._is_always_degenerate:
                 here = replace(here, special=special)
-            extra = surplus(redundant_rows(at), self.redundant)
+            extra = subtract_generic_rows(count_redundant_rows(at), self.redundant)
             return replace(
                 posture,
                 formation=here if hidden.singularity_indices else None,
@@ -218,20 +222,20 @@ class ConfigurationAnalysis(Value):
         )
         if real is not None and real.singularity_indices:
             real = replace(real, unobserved=self._name_freedoms(at, self._real(at).unobserved_twists))
-        extra = surplus(redundant_rows(at), self.redundant)
+        extra = subtract_generic_rows(count_redundant_rows(at), self.redundant)
         gained = self._name_freedoms(at, self._gained_twists(found)) if posture.constraint_singular else ()
         return replace(posture, hidden=hidden, real=real, gained=gained, redundant=list_redundant(extra, generic=False))
 
     @staticmethod
     def _kinds(found: VelocityRelation, usual: Counts) -> SingularityReport:
-        gap = gap_of(found)
+        gap = find_smallest_gap(found)
         return SingularityReport(
-            found.rank, gap, SingularityIndices.of(Counts.of(found), usual) if gap >= RANK_GAP else None
+            found.rank, gap, SingularityIndices.of(Counts.of(found), usual) if gap >= RANK_GAP_MIN else None
         )
 
     def _distances(self, at: ClosedConfiguration, found: VelocityRelation) -> SingularityDistances:
         constraints = 0.0 if found.mobility > self.usual.mobility else at.kernel()[1].weakest
-        M = interaction_matrix(found)
+        M = compute_interaction_matrix(found)
         if M is None or self.usual.unexplained:
             reached = None if self.usual.unexplained else 0.0
             return SingularityDistances(None, reached, constraints, None, None, None)
@@ -267,6 +271,9 @@ class ConfigurationAnalysis(Value):
         """Name twists (3 or 6, k) in characteristic lengths."""
         setup = self.setup
         start = setup.all_samples.start
-        at_zero = at.model is start.model and np.max(np.abs(at.q - start.q), initial=0.0) < PASSED_BY * PASSED_BY
+        at_zero = (
+            at.model is start.model
+            and np.max(np.abs(at.q - start.q), initial=0.0) < WAYPOINT_RESIDUAL_TOL * WAYPOINT_RESIDUAL_TOL
+        )
         position = None if at_zero else at.pose(self.setup.motion.link)[:3, 3]
         return name_freedoms(twists, setup.decomposition, setup.labels, position)

@@ -9,13 +9,13 @@ from math import comb
 from typing import Annotated, NamedTuple
 
 from ..kinematics.sampling import Samples
-from ..mechanism.observation import labels_of
-from ..mechanism.pose import asked_pose
+from ..mechanism.observation import list_labels
+from ..mechanism.pose import parse_pose
 from ..progress import report
 from ..records import FLAT, As, Recorded, Shown, recorded
 from ..results import Result
 from .analysis_declaration import analysis
-from .exact import ExactVerdict, architecture
+from .exact import ExactVerdict, get_architecture
 from .observed import (
     BeginPose,
     CameraLike,
@@ -30,14 +30,14 @@ from .observed import (
     restrict_samples,
 )
 from .pose_requests import observe as observed
-from .verdict import Verdict, verdict_of
+from .verdict import Verdict, compute_verdict
 
-LARGEST_COMPLETE = 10
+ALL_LEG_SETS_LEGS_MAX = 10
 """Number of legs up to which all sets are listed; beyond, sets of up to three, the smallest and the whole."""
-LARGEST_FORMATION = 6
+ALL_FORMATION_SETS_MAX = 6
 """Number of observations of a formation up to which all sets are listed; beyond, single ones, the smallest sets and the
 whole."""
-MOST_TRIED = 1024
+EQUAL_SIZE_SETS_MAX = 1024
 """Number of sets of one size above which, instead of all smallest sets, one set is searched of which none can be left
 out."""
 
@@ -108,7 +108,9 @@ class Legs(Result, shown_as="legs"):
     other_modes = Shown(list[OtherMode], lambda self: self.setup.other_modes)
 
 
-def _smallest(labels: tuple[str, ...], rank: Callable[[tuple[str, ...]], int]) -> tuple[list[tuple[str, ...]], bool]:
+def _find_smallest_sets(
+    labels: tuple[str, ...], rank: Callable[[tuple[str, ...]], int]
+) -> tuple[list[tuple[str, ...]], bool]:
     """Return the smallest sets of the rank of all, and True if these are all of them. A subset never has a higher rank:
     what cannot be left out of all is in each set of that rank."""
     whole = rank(labels)
@@ -124,7 +126,7 @@ def _smallest(labels: tuple[str, ...], rank: Callable[[tuple[str, ...]], int]) -
             kept = fewer
     for size in range(max(1, len(needed)), len(kept) + 1):
         more = size - len(needed)
-        if comb(len(others), more) > MOST_TRIED:
+        if comb(len(others), more) > EQUAL_SIZE_SETS_MAX:
             return [kept], False
         sets = [
             tuple(label for label in labels if label in needed or label in chosen)
@@ -180,7 +182,7 @@ def legs(
     ------
     BadRequest
         For unknown names.
-    RankUndecided
+    UndecidedRank
         If a rank has no clear gap.
 
     Notes
@@ -194,13 +196,13 @@ def legs(
     """
     setup = observed(robot, observe, camera, sensor=sensor, at=at, seed=seed)
     decomposition = setup.decomposition
-    whole = observe is None and all(each.by_segment for each in setup.observed)
+    whole = observe is None and all(each.is_segment_direction for each in setup.observed)
     segments = setup.all_legs if whole else setup.observed
-    labels = labels_of(segments)
+    labels = list_labels(segments)
     sets, exact = list[Verdict](), list[ExactVerdict]()
-    generic = architecture(setup)
+    generic = get_architecture(setup)
     formation = setup.mechanism.formation
-    complete = len(labels) <= (LARGEST_FORMATION if formation else LARGEST_COMPLETE)
+    complete = len(labels) <= (ALL_FORMATION_SETS_MAX if formation else ALL_LEG_SETS_LEGS_MAX)
     few = 1 if formation else 3
 
     def samples_of(chosen: tuple[str, ...]) -> Samples:
@@ -217,11 +219,11 @@ def legs(
     ]
     known = True
     if not complete:
-        found, known = _smallest(labels, rank)
+        found, known = _find_smallest_sets(labels, rank)
         tried = sorted({*tried, *found}, key=lambda each: (len(each), [labels.index(label) for label in each]))
     for chosen in tried:
         samples = samples_of(chosen)
-        sets.append(verdict_of(setup, chosen, samples))
+        sets.append(compute_verdict(setup, chosen, samples))
         exact.append(generic.verdict(samples.observation_model.observations))
         report("sets of legs")
     best = max(each.rank for each in sets)
@@ -237,5 +239,5 @@ def legs(
         complete,
         minimal,
         known,
-        **({} if at is None else {"where": str(asked_pose(at))}),
+        **({} if at is None else {"where": str(parse_pose(at))}),
     )

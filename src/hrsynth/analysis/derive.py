@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import numpy as np
 
-from ..description.tree import spanning
+from ..description.tree import build_spanning_mechanism
 from ..errors import BadMechanism, BadRequest, NoEquivalentRobot
-from ..geometry.ranks import range_basis
+from ..geometry.ranks import compute_range_basis
 from ..geometry.vectors import Array
 from ..kinematics.equivalence import EquivalenceCheck, check_equivalence
 from ..kinematics.sampling import Samples
 from ..mechanism import Mechanism
 from ..mechanism.legs import LegDecomposition, decompose
-from ..mechanism.normal import normal_form
+from ..mechanism.normal import reduce_to_normal_form
 from ..mechanism.notation import Architecture
 from ..mechanism.observations.direction import Direction
 from ..options import option
@@ -25,11 +25,11 @@ from ..records import ANGLE, FLAT, As, Recorded, Shown, recorded
 from ..results import Result, Value
 from ..rewrite.evidence import Evidence
 from ..rewrite.state import State
-from ..rewrite.strategy import FORMS, GENERAL, OBSERVED_STAGES, Check, Rewriting, Step, Strategy, apply_unchecked
-from ..tolerances import SAME_RELATION
+from ..rewrite.strategy import FORMS, GENERAL, OBSERVED_STAGES, Check, RewriteTrace, Step, Strategy, apply_unchecked
+from ..tolerances import RELATION_ANGLE_TOL
 from .analysis_declaration import analysis
 from .exact import ExactVerdict
-from .exact import architecture as exact_architecture
+from .exact import get_architecture as exact_architecture
 from .freedoms import Freedom, name_freedoms
 from .observed import (
     POINTS,
@@ -46,13 +46,13 @@ from .observed import (
     SeeLike,
 )
 from .pose_requests import observe as observed_robot
-from .verdict import Verdict, verdict_of
+from .verdict import Verdict, compute_verdict
 
 if TYPE_CHECKING:
     from ..mechanism.pose import PoseLike
     from .modes.modes import AssemblyModes
 
-STEP_SAMPLES = 3
+REWRITE_STEP_SAMPLES_COUNT = 3
 """Configurations at which a single step is checked."""
 
 
@@ -126,7 +126,7 @@ class Derivation(Result, shown_as="derive"):
     @recorded()
     def steps(self) -> tuple[Step, ...]:
         """All attempts, each compared separately with the real robot."""
-        check = _check(self.setup.samples, STEP_SAMPLES)
+        check = _check(self.setup.samples, REWRITE_STEP_SAMPLES_COUNT)
         return tuple(step.measured(check) for step in self.taken)
 
     @property
@@ -253,27 +253,27 @@ def derive(
         raise BadRequest("--form", form, tuple(FORMS))
     setup = observed_robot(robot, observe, camera, sensor=sensor, at=at, seed=seed)
     decomposition, samples = setup.decomposition, setup.samples
-    verdict = verdict_of(setup, setup.labels, samples)
+    verdict = compute_verdict(setup, setup.labels, samples)
     exact = exact_architecture(setup).verdict(setup.observed)
     evidence = Evidence(decomposition, samples)
 
     for trusted in (OBSERVED_STAGES, ()):
-        result = FORMS[form](Rewriting.of(evidence, _check(samples, STEP_SAMPLES), trusted))
-        hidden, certificate = _certify(setup, result.state, samples)
-        if hidden is not None and certificate.passed and result.virtual_only:
+        result = FORMS[form](RewriteTrace.of(evidence, _check(samples, REWRITE_STEP_SAMPLES_COUNT), trusted))
+        hidden, certificate = _check_hidden_robot(setup, result.state, samples)
+        if hidden is not None and certificate.passed and result.has_virtual_motors_only:
             break
     architecture: Architecture | None = None
     without_checks = None
     if hidden is not None:
-        if not (certificate.passed and result.virtual_only):
-            result, hidden, certificate = _fallback(setup, evidence, samples, certificate, FORMS[form])
+        if not (certificate.passed and result.has_virtual_motors_only):
+            result, hidden, certificate = _derive_again(setup, evidence, samples, certificate, FORMS[form])
         architecture = result.state.architecture()
-        segments = all(each.by_segment for each in setup.observed)
+        segments = all(each.is_segment_direction for each in setup.observed)
         if unchecked and form == "simplified" and architecture is not None and segments:
             report("the unchecked form")
-            without_checks = _unchecked_form(setup, evidence, samples, architecture, certificate)
+            without_checks = _derive_unchecked(setup, evidence, samples, architecture, certificate)
     elif not certificate.passed:
-        raise NoEquivalentRobot(setup.robot.name, certificate.largest_angle, SAME_RELATION)
+        raise NoEquivalentRobot(setup.robot.name, certificate.largest_angle, RELATION_ANGLE_TOL)
     return Derivation(
         setup.robot,
         setup,
@@ -289,23 +289,25 @@ def derive(
     )
 
 
-def _certify(setup: ObservedRobot, state: State, samples: Samples) -> tuple[Mechanism | None, EquivalenceCheck]:
+def _check_hidden_robot(
+    setup: ObservedRobot, state: State, samples: Samples
+) -> tuple[Mechanism | None, EquivalenceCheck]:
     """Return the hidden robot (None if every leg is a constant-direction leg) and its equivalence check at all
     samples."""
     if not state.actuators:
-        return None, _blind(samples)
+        return None, _check_without_legs(samples)
     report("certificate")
-    hidden = finish_robot(setup, state)
+    hidden = build_final_robot(setup, state)
     return hidden, check_equivalence(samples, hidden)
 
 
-def finish_robot(setup: ObservedRobot, state: State) -> Mechanism:
+def build_final_robot(setup: ObservedRobot, state: State) -> Mechanism:
     """The hidden robot as a file writes it: a spanning tree, names of its own, its observations; its platform turns
     where the real one does. Of a formation, whose bodies are joined now, the first one is the platform."""
     mechanism = state.mechanism
     observations = tuple(o for o in setup.observed if {o.link, o.seen_from or o.link} <= mechanism.links.keys())
     cameras = tuple(camera for camera in mechanism.cameras if camera.link in mechanism.links)
-    hidden = spanning(
+    hidden = build_spanning_mechanism(
         replace(
             mechanism,
             name=f"{setup.robot.name}_hidden",
@@ -315,19 +317,19 @@ def finish_robot(setup: ObservedRobot, state: State) -> Mechanism:
             formation=False,
         )
     )
-    return _as_legs(hidden, turns=setup.samples.observation_model.point is None)
+    return _note_rotation(hidden, turns=setup.samples.observation_model.point is None)
 
 
-def _as_legs(hidden: Mechanism, turns: bool) -> Mechanism:
+def _note_rotation(hidden: Mechanism, turns: bool) -> Mechanism:
     """Set on a mechanism whether its platform ``turns``, if its joints leave that open, and its observations; a segment
     in none of its legs (of a single leg the platform) becomes a direction of its link. Without a leg on the base, as in
     a formation, it stays as it is."""
     told = tuple(
-        replace(o, seen_from=hidden.reference) if isinstance(o, Direction) and o.by_segment else o
+        replace(o, seen_from=hidden.reference) if isinstance(o, Direction) and o.is_segment_direction else o
         for o in hidden.observations
     )
     try:
-        decomposition = decompose(normal_form(replace(hidden, observations=told, turns=None)).mechanism)
+        decomposition = decompose(reduce_to_normal_form(replace(hidden, observations=told, turns=None)).mechanism)
     except BadMechanism:
         return hidden
     observations = tuple(
@@ -341,33 +343,33 @@ def _check(samples: Samples, count: int | None) -> Check:
     return lambda mechanism, bodies: check_equivalence(samples, mechanism, count=count, bodies=bodies, complete=False)
 
 
-def _fallback(
+def _derive_again(
     setup: ObservedRobot, evidence: Evidence, samples: Samples, failed: EquivalenceCheck, asked: Strategy
-) -> tuple[Rewriting, Mechanism, EquivalenceCheck]:
+) -> tuple[RewriteTrace, Mechanism, EquivalenceCheck]:
     """Repeat the derivation if the check at all samples fails after that at three: check every step of the requested
     form at all samples, then of the general form."""
     for run in dict.fromkeys((asked, GENERAL)):
-        again = run(Rewriting.of(evidence, _check(samples, None)))
-        hidden = finish_robot(setup, again.state)
+        again = run(RewriteTrace.of(evidence, _check(samples, None)))
+        hidden = build_final_robot(setup, again.state)
         certificate = check_equivalence(samples, hidden)
-        if certificate.passed and again.virtual_only:
+        if certificate.passed and again.has_virtual_motors_only:
             return again, hidden, certificate
-    raise NoEquivalentRobot(setup.robot.name, failed.largest_angle, SAME_RELATION)
+    raise NoEquivalentRobot(setup.robot.name, failed.largest_angle, RELATION_ANGLE_TOL)
 
 
-def _blind(samples: Samples) -> EquivalenceCheck:
+def _check_without_legs(samples: Samples) -> EquivalenceCheck:
     """Return the equivalence check of constant-direction legs: the directions do not move at all."""
     angle = max(
         float(np.linalg.norm(member.relation.rates, 2)) if member.relation.dimension else 0.0
         for member in samples.members
     )
     gap = min(member.relation.gap for member in samples.members)
-    passed = angle <= SAME_RELATION
+    passed = angle <= RELATION_ANGLE_TOL
     reason = "u̇ vanishes: every observed direction is constant" if passed else "an observed direction moves"
     return EquivalenceCheck(len(samples.members), samples.discarded, angle, gap, 0.0, passed, reason)
 
 
-def _unchecked_form(
+def _derive_unchecked(
     setup: ObservedRobot, evidence: Evidence, samples: Samples, certified: Architecture, certificate: EquivalenceCheck
 ) -> UncheckedForm:
     """Apply the rules without checking their conditions, and compare what they give with the real robot.
@@ -375,7 +377,7 @@ def _unchecked_form(
     The ends of the legs are changed only where the hidden robot would not keep its dof otherwise (MMT 3.2).
     """
     dof = setup.dof
-    planar = _planar(samples)
+    planar = _is_planar(samples)
     change = dof < (3 if planar else 6) and len(samples.observation_model.observations) < len(setup.decomposition.legs)
     tried: list[tuple[EquivalenceCheck, Architecture]] = []
     for rewriting in apply_unchecked(evidence, change_ends=change):
@@ -384,25 +386,25 @@ def _unchecked_form(
             return UncheckedForm(
                 architecture, True, certificate.largest_angle, reason="it is the form that passed the equivalence check"
             )
-        found = check_equivalence(samples, rewriting.state.mechanism, count=STEP_SAMPLES, complete=False)
+        found = check_equivalence(samples, rewriting.state.mechanism, count=REWRITE_STEP_SAMPLES_COUNT, complete=False)
         if found.passed:
             reason = "equivalent, but not the simplest form"
             return UncheckedForm(architecture, True, found.largest_angle, reason=reason)
         tried.append((found, architecture))
     found, architecture = min(reversed(tried), key=lambda pair: pair[0].largest_angle)
-    gains, loses = _exchanged_freedoms(setup.decomposition, found)
+    gains, loses = _compare_platform_dof(setup.decomposition, found)
     return UncheckedForm(architecture, False, found.largest_angle, gains, loses, found.reason)
 
 
-def _planar(samples: Samples) -> bool:
+def _is_planar(samples: Samples) -> bool:
     """Return True if all platform motions are those of one plane."""
     twists = np.hstack([member.relation.twists for member in samples.members])
     if twists.shape[0] == 3:
-        return range_basis(twists, 1.0)[1].value <= 2
-    return range_basis(twists[3:], 1.0)[1].value <= 1 and range_basis(twists[:3], 1.0)[1].value <= 2
+        return compute_range_basis(twists, 1.0)[1].value <= 2
+    return compute_range_basis(twists[3:], 1.0)[1].value <= 1 and compute_range_basis(twists[:3], 1.0)[1].value <= 2
 
 
-def _exchanged_freedoms(
+def _compare_platform_dof(
     decomposition: LegDecomposition, found: EquivalenceCheck
 ) -> tuple[tuple[Freedom, ...], tuple[Freedom, ...]]:
     """Return the platform dof that a non-equivalent robot gains and loses, at the configuration where they differ."""
@@ -411,7 +413,7 @@ def _exchanged_freedoms(
     real, hidden, position = found.mismatch.real, found.mismatch.hidden, found.mismatch.position
 
     def beyond(inner: Array, outer: Array) -> tuple[Freedom, ...]:
-        rest = range_basis(inner - outer @ (outer.T @ inner), 1.0)[0]
+        rest = compute_range_basis(inner - outer @ (outer.T @ inner), 1.0)[0]
         return name_freedoms(rest, decomposition, position=position)
 
     gains, loses = beyond(hidden.twists, real.twists), beyond(real.twists, hidden.twists)

@@ -9,7 +9,7 @@ the platform is rank X − rank [X; Y] + rank Y, ranks on ker A.
    merely *sampled* ones are listed, and the verdict is not *proved*);
 2. rank [A; Y] = rank [A; Y; X] at one instance: exact (:meth:`ExactArchitecture._rank`);
 3. rank [A; Y; X] there is the largest on F, except for a chance (:meth:`ExactArchitecture._chance`);
-4. the robot is a regular member of F: numerical (:meth:`ExactArchitecture._regular`).
+4. the robot is a regular member of F: numerical (:meth:`ExactArchitecture._has_full_column_rank`).
 
 A *deficient* verdict has the largest rank of several instances: it is probabilistic. What a single link's dimensions
 make special (three centres on a line) belongs to a robot, not to its architecture; its rank may be lower, never higher.
@@ -26,30 +26,39 @@ from typing import Annotated
 
 import numpy as np
 
-from ..batch.platform_coordinates import frames_at
-from ..budgets import LARGEST_RANDOM, REMEMBERED
+from ..batch.platform_coordinates import collect_frames
+from ..budgets import CACHED_OBSERVED_ROBOTS_COUNT, LARGEST_RANDOM
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.velocity_relation import ObservationModel, VelocityRelation
 from ..mechanism import Mechanism, Observation
 from ..mechanism.incidences import Incidences, recognise
 from ..mechanism.model import JointType
-from ..mechanism.observation import labels_of
+from ..mechanism.observation import list_labels
 from ..mechanism.observations.direction import SeenAxis
-from ..mechanism.structural_incidences import GeometricIncidence, carried_by_joints, ties
+from ..mechanism.structural_incidences import GeometricIncidence, find_structural_incidences, list_incidences
 from ..records import OPTIONAL, As, Record, Recorded, Word
-from ..results import Compared, finite
-from ..tolerances import CLOSED
-from .formation import PLACES, following, sense_links
-from .formation import word as formation_word
-from .instances import Instance, NotRecognised, draw, instance, kernel, random_numbers, rank, ranks_at
-from .loop_invariants import are_kept, degree
+from ..results import ComparableValue, drop_infinite
+from ..tolerances import CLOSURE_RESIDUAL_TOL
+from .formation import SENSED_POINTS_COUNT, evaluate_formation_rows, measure_links
+from .formation import name_rigidity as formation_word
+from .instances import (
+    Instance,
+    RecognitionFailure,
+    build_instance,
+    compute_exact_kernel,
+    compute_float_ranks,
+    draw,
+    draw_whole_numbers,
+    rank,
+)
+from .loop_invariants import bound_degree, find_invariant_incidences
 from .observed import ObservedRobot, select_relation
-from .sensor_rows import DEGREE, SensorPlaces, has_exact_rates
-from .verdict import word
+from .sensor_rows import WRENCH_DEGREE_MAX, SensorPlaces, has_exact_rates
+from .verdict import name_controllability
 
-INSTANCES = 5
+EXACT_RANK_INSTANCES_COUNT = 5
 """Random instances at which a deficient rank is confirmed."""
-TESTS = 3
+IDENTITY_INSTANCES_COUNT = 3
 """Random instances at which identities are tested."""
 
 
@@ -71,7 +80,7 @@ class Basis(Record):
         """Describe incidences that nearly hold; empty without any."""
         text = (
             f"; incidences with a defect up to {self.largest_defect_held:.1e} count"
-            if self.largest_defect_held > CLOSED
+            if self.largest_defect_held > CLOSURE_RESIDUAL_TOL
             else ""
         )
         return text + (
@@ -82,7 +91,7 @@ class Basis(Record):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ExactVerdict(Compared):
+class ExactVerdict(ComparableValue):
     """Verdict for the generic geometry of an architecture with some legs observed.
 
     ``verdict`` and ``rank`` are None unless it is ``exact``; ``reason`` explains it. ``instances`` counts the random
@@ -135,24 +144,25 @@ class ExactArchitecture:
         self._random = random.Random(0)
 
     def instance(self, number: int) -> Instance:
-        """The instance of this number, from 0; raises ``NotRecognised`` where it is not one of the architecture."""
+        """The instance of this number, from 0; raises ``RecognitionFailure`` where it is not one of the
+        architecture."""
         while len(self._instances) <= number:
             if self.obstacle:
-                raise NotRecognised(self.obstacle)
+                raise RecognitionFailure(self.obstacle)
             try:
                 drawn = draw(self.relations, self._random)
-                found = instance(self.mechanism, self.relations, self.observations, drawn)
+                found = build_instance(self.mechanism, self.relations, self.observations, drawn)
                 self._check(found)
-            except NotRecognised as error:
+            except RecognitionFailure as error:
                 self.obstacle = str(error)
                 raise
             self._instances.append(found)
         return self._instances[number]
 
     def _check(self, found: Instance) -> None:
-        _same("mobility", found.mobility, self.relation.mobility)
-        _same("dof", found.dof, self.dof)
-        _same("dim ρ", found.ranks(range(len(self.observations)))[0], self.relation.dimension)
+        _require_same("mobility", found.mobility, self.relation.mobility)
+        _require_same("dof", found.dof, self.dof)
+        _require_same("dim ρ", found.ranks(range(len(self.observations)))[0], self.relation.dimension)
 
     def verdict(self, observed: Sequence[Observation]) -> ExactVerdict:
         """The verdict for some of the observations."""
@@ -162,92 +172,104 @@ class ExactArchitecture:
         return self._answers[asked]
 
     def _verdict(self, observed: Sequence[Observation]) -> ExactVerdict:
-        legs = labels_of(observed)
+        legs = list_labels(observed)
         try:
             seen, instances = self._rank(observed)
             basis = self.basis
             trivial = self._trivial(observed) if self.mechanism.formation else None
             chance = self._chance(observed) if seen == self.dof > 0 and not basis.sampled else 0.0
-        except NotRecognised as error:
+        except RecognitionFailure as error:
             return ExactVerdict(legs, None, None, self.dof, False, 0, str(error))
         proved = seen == self.dof and not basis.sampled and (self.dof > 0 or trivial is not None)
         random = f"exact at {instances} random instance" + "s" * (instances > 1)
         reason = "proved in exact arithmetic" if proved else random
         if chance:
-            reason += f", except for a chance below {power_above(chance)}"
+            reason += f", except for a chance below {round_up_power(chance)}"
         if basis.sampled:
             reason += f" of geometry with {len(basis.sampled)} sampled incidences ({basis.sampled[0]})"
         reason += basis.nearly
-        said = word(seen, self.dof) if trivial is None else formation_word(self.dof - seen - trivial)
+        said = name_controllability(seen, self.dof) if trivial is None else formation_word(self.dof - seen - trivial)
         return ExactVerdict(legs, said, seen, self.dof, True, instances, reason, proved, chance, basis, trivial)
 
     def _trivial(self, observed: Sequence[Observation]) -> int:
         """Return the number of independent trivial motions: the least of several instances."""
         places = [self._places[o.key] for o in observed]
-        return min(self._count_similarities(self.instance(i), places) for i in range(INSTANCES))
+        return min(self._count_similarities(self.instance(i), places) for i in range(EXACT_RANK_INSTANCES_COUNT))
 
     def _count_similarities(self, found: Instance, places: Sequence[int]) -> int:
         """Return the number of independent similarities that move all observed points together, at an instance, in
         unobserved motions."""
-        draws = [(random_numbers(3, self._random), random_numbers(3, self._random)) for _ in range(PLACES)]
+        draws = [
+            (draw_whole_numbers(3, self._random), draw_whole_numbers(3, self._random))
+            for _ in range(SENSED_POINTS_COUNT)
+        ]
         parts = [
             part
             for i in places
             if (at := found.sightings[i]) is not None
-            for part in sense_links(self.observations[i], self.mechanism.reference, at, draws)
+            for part in measure_links(self.observations[i], self.mechanism.reference, at, draws)
         ]
         if not parts:
             return 0
-        unseen = kernel(np.vstack([found.rates[i] for i in places]))
-        motions, common = following(parts, {link: twist @ unseen for link, twist in found.twists().items()})
+        unseen = compute_exact_kernel(np.vstack([found.rates[i] for i in places]))
+        motions, common = evaluate_formation_rows(
+            parts, {link: twist @ unseen for link, twist in found.twists().items()}
+        )
         return rank(motions) + rank(common) - rank(np.hstack([motions, common]))
 
     @cached_property
     def basis(self) -> Basis:
-        """Return the basis of the incidences; raises ``NotRecognised`` if the robot is no regular member of its
+        """Return the basis of the incidences; raises ``RecognitionFailure`` if the robot is no regular member of its
         family."""
-        every = ties(self.relations)
-        known = carried_by_joints(self.mechanism, self.relations, every)
+        every = list_incidences(self.relations)
+        known = find_structural_incidences(self.mechanism, self.relations, every)
         left = [tie for tie, holds in zip(every, known, strict=True) if not holds]
-        regular = self._regular()
-        if left and not (regular and self.start == self.instance(0).mobility and self._all_kept(every)):
+        regular = self._is_zero_regular()
+        if left and not (regular and self.start == self.instance(0).mobility and self._has_invariant_incidences(every)):
             kept_too, observed = 0, tuple(tie.words(self.relations) for tie in left)
         else:
             kept_too, observed = len(left), ()
         missed = self.relations.missed
-        return Basis(len(every) - len(left), kept_too, observed, self.relations.held, finite(missed))
+        return Basis(len(every) - len(left), kept_too, observed, self.relations.held, drop_infinite(missed))
 
-    def _regular(self) -> bool:
+    def _is_zero_regular(self) -> bool:
         """Return True if the zero configuration is a regular member of the family, as the instance is; a sample must
         be."""
         ranks = self.instance(0).geometry.ranks
-        if ranks_at(self.relations, 0) == ranks:
+        if compute_float_ranks(self.relations, 0) == ranks:
             return True
-        if ranks_at(self.relations, -1) != ranks:
-            raise NotRecognised("its geometry is not recognised: it is more special than its incidences imply")
+        if compute_float_ranks(self.relations, -1) != ranks:
+            raise RecognitionFailure("its geometry is not recognised: it is more special than its incidences imply")
         return False
 
-    def _all_kept(self, every: Sequence[GeometricIncidence]) -> bool:
+    def _has_invariant_incidences(self, every: Sequence[GeometricIncidence]) -> bool:
         """Return True if the motions of each of some instances preserve all incidences."""
-        return all(all(are_kept(every, self.relations, self.instance(i))) for i in range(TESTS))
+        return all(
+            all(find_invariant_incidences(every, self.relations, self.instance(i)))
+            for i in range(IDENTITY_INSTANCES_COUNT)
+        )
 
     def _chance(self, observed: Sequence[Observation]) -> float:
         """Bound of the probability that an identity on which *proved* depends is false (0: none is tested)."""
         places = [self._places[o.key] for o in observed]
         found = [self.instance(0)]
-        spins = sum(self._spins(link, places) for link in self.mechanism.links)
+        spins = sum(self._is_spinning_rod(link, places) for link in self.mechanism.links)
         tested = self.basis.loop_invariant + bool(
             self.basis.loop_invariant
         )  # each relation, and that the rank of A is the largest on F
         if found[0].mobility - found[0].ranks(places)[0] != spins:
             tested += 1
-            found += [self.instance(i) for i in range(1, TESTS)]
+            found += [self.instance(i) for i in range(1, IDENTITY_INSTANCES_COUNT)]
             for each in found:
-                _same("dim ρ of these legs", each.ranks(places)[0], found[0].ranks(places)[0])
+                _require_same("dim ρ of these legs", each.ranks(places)[0], found[0].ranks(places)[0])
         rows = sum(each.size for each in self.observations if not isinstance(each, SeenAxis))
-        return tested * (degree(self.relations, len(found[0].free) + DEGREE * rows) / (2 * LARGEST_RANDOM)) ** TESTS
+        return (
+            tested
+            * (bound_degree(self.relations, len(found[0].free) + WRENCH_DEGREE_MAX * rows) / (2 * LARGEST_RANDOM))
+            ** IDENTITY_INSTANCES_COUNT
+        )
 
-    def _spins(self, link: str, places: Sequence[int]) -> bool:
+    def _is_spinning_rod(self, link: str, places: Sequence[int]) -> bool:
         """Return True if a link is a rod between two S joints that can spin unobserved."""
         joints = self.mechanism.joints_of(link)
         if (
@@ -256,7 +278,7 @@ class ExactArchitecture:
             or link in (self.mechanism.base, self.mechanism.platform, self.mechanism.reference)
         ):
             return False
-        others = (self.observations[i] for i in places if not self.observations[i].by_segment)
+        others = (self.observations[i] for i in places if not self.observations[i].is_segment_direction)
         if any(link in (o.link, o.seen_from) for o in others):
             return False
         ends = {self.relations.centres[joint.name] for joint in joints}
@@ -278,7 +300,7 @@ class ExactArchitecture:
         unknown = [o for o in observed if o.key not in self._places]
         if unknown:
             odd = unknown[0]
-            raise NotRecognised(
+            raise RecognitionFailure(
                 f"the observation of link {odd.link} is not a direction and not requested"
                 if has_exact_rates(odd)
                 else f"the measured value of {odd.kind} {odd.leg} is not rational"
@@ -286,24 +308,24 @@ class ExactArchitecture:
         places = [self._places[o.key] for o in observed]
         dimension = select_relation(self.relation, places).dimension
         best = 0
-        for number in range(INSTANCES):
+        for number in range(EXACT_RANK_INSTANCES_COUNT):
             together, rates = self.instance(number).ranks(places)
-            _same("dim ρ of these legs", together, dimension)
+            _require_same("dim ρ of these legs", together, dimension)
             best = max(best, self.dof - together + rates)
             if best == self.dof > 0:  # another instance may have motions where this one has none
                 return best, 1
-        return best, INSTANCES
+        return best, EXACT_RANK_INSTANCES_COUNT
 
 
-@lru_cache(maxsize=REMEMBERED)
-def architecture(setup: ObservedRobot) -> ExactArchitecture:
+@lru_cache(maxsize=CACHED_OBSERVED_ROBOTS_COUNT)
+def get_architecture(setup: ObservedRobot) -> ExactArchitecture:
     """The architecture of a robot, from its zero configuration and its samples."""
     all_samples = setup.all_samples
     at = [all_samples.start, *setup.configurations]
-    return architecture_of(setup.mechanism, all_samples.observation_model, at, all_samples.members[0].relation)
+    return build_architecture(setup.mechanism, all_samples.observation_model, at, all_samples.members[0].relation)
 
 
-def architecture_of(
+def build_architecture(
     mechanism: Mechanism,
     observation_model: ObservationModel,
     at: Sequence[ClosedConfiguration],
@@ -314,20 +336,20 @@ def architecture_of(
     observed = [observation_model.observations[i] for i in places]
     sensors = SensorPlaces.of(observed, mechanism)
     directions = [*(o for o in observed if isinstance(o, SeenAxis)), *sensors.as_observed()]
-    relations = recognise(mechanism, frames_at(at), directions, observation_model.point, sensors.points)
+    relations = recognise(mechanism, collect_frames(at), directions, observation_model.point, sensors.points)
     return ExactArchitecture(
         mechanism, relations, observed, select_relation(relation, places), at[0].kernel()[0].shape[1]
     )
 
 
-def power_above(chance: float) -> str:
+def round_up_power(chance: float) -> str:
     """The power of ten next above a chance."""
     return f"1e{math.ceil(math.log10(chance))}"
 
 
-def _same(what: str, here: int, there: int) -> None:
+def _require_same(what: str, here: int, there: int) -> None:
     if here != there:
-        raise NotRecognised(
+        raise RecognitionFailure(
             f"its geometry is not recognised: {what} is {there}, but {here} with only the incidences that "
             "persist in motion"
         )

@@ -8,13 +8,13 @@ from typing import Annotated
 
 import numpy as np
 
-from ..geometry.ranks import kernel_basis, range_basis, space_basis
-from ..geometry.vectors import Array, cross, orient_axis, unit
+from ..geometry.ranks import compute_kernel_basis, compute_range_basis, compute_space_basis
+from ..geometry.vectors import Array, cross, normalise_vector, orient_axis
 from ..mechanism import JointType
 from ..mechanism.legs import LegDecomposition
 from ..records import As
 from ..results import Value
-from ..tolerances import NAMED
+from ..tolerances import NAMED_TWIST_TOL
 
 _AXES = "xyz"
 
@@ -40,40 +40,40 @@ def name_freedoms(
     """
     if twists.shape[1] == 0:
         return ()
-    twists = range_basis(_metric(twists, decomposition.mechanism.length))[0]
+    twists = compute_range_basis(_scale_twists(twists, decomposition.mechanism.length))[0]
     found: list[Freedom] = []
-    free, _ = kernel_basis(twists[3:], 1.0)
-    translations = range_basis(twists[:3] @ free, 1.0)[0] if free.shape[1] else np.zeros((3, 0))
-    for direction in directions_in(translations, decomposition):
+    free, _ = compute_kernel_basis(twists[3:], 1.0)
+    translations = compute_range_basis(twists[:3] @ free, 1.0)[0] if free.shape[1] else np.zeros((3, 0))
+    for direction in name_directions(translations, decomposition):
         twist = np.concatenate([direction, np.zeros(3)])
-        found.append(Freedom(twist, f"translation along {direction_name(direction, decomposition)}"))
-    for point, direction, name in _lines(decomposition, labels) if position is None else ():
+        found.append(Freedom(twist, f"translation along {name_direction(direction, decomposition)}"))
+    for point, direction, name in _list_lines(decomposition, labels) if position is None else ():
         if len(found) == twists.shape[1]:
             break
-        twist = _rotation(decomposition, point, direction)
-        if _inside(twist, twists) and not _is_spanned(twist, found):
+        twist = _build_rotation(decomposition, point, direction)
+        if _is_in_span(twist, twists) and not _is_spanned(twist, found):
             found.append(Freedom(twist, f"rotation about {name}"))
     for column in twists.T:
         if len(found) == twists.shape[1]:
             break
-        rest = _without(column, found)
-        if np.linalg.norm(rest[3:]) > NAMED and not _is_spanned(rest, found):
-            twist = rest / (rest[3:] @ orient_axis(unit(rest[3:])))
+        rest = _remove_twist(column, found)
+        if np.linalg.norm(rest[3:]) > NAMED_TWIST_TOL and not _is_spanned(rest, found):
+            twist = rest / (rest[3:] @ orient_axis(normalise_vector(rest[3:])))
             origin = (
                 decomposition.mechanism.links[decomposition.mechanism.platform].pose[:3, 3]
                 if position is None
                 else position
             )
-            found.append(Freedom(twist, _screw(origin, twist)))
+            found.append(Freedom(twist, _describe_screw(origin, twist)))
     return tuple(found)
 
 
-def point_text(point: Iterable[float]) -> str:
+def format_point(point: Iterable[float]) -> str:
     """A point or a vector in words: ``(0.1 0 -0.7)``."""
     return "(" + " ".join(f"{0.0 if abs(value) < 1e-9 else value:.4g}" for value in point) + ")"
 
 
-def _metric(twists: Array, length: float) -> Array:
+def _scale_twists(twists: Array, length: float) -> Array:
     """Twists (6 or 3, k) in lengths of ``length`` metres as (6, k) in metres and radians."""
     found = np.zeros((6, twists.shape[1]))
     found[: len(twists)] = twists
@@ -81,51 +81,51 @@ def _metric(twists: Array, length: float) -> Array:
     return found
 
 
-def _inside(twist: Array, span: Array) -> bool:
+def _is_in_span(twist: Array, span: Array) -> bool:
     unit_twist = twist / np.linalg.norm(twist)
-    return bool(np.linalg.norm(unit_twist - span @ (span.T @ unit_twist)) < NAMED)
+    return bool(np.linalg.norm(unit_twist - span @ (span.T @ unit_twist)) < NAMED_TWIST_TOL)
 
 
-def _without(twist: Array, found: list[Freedom]) -> Array:
+def _remove_twist(twist: Array, found: list[Freedom]) -> Array:
     if not found:
         return twist
-    basis = range_basis(np.column_stack([f.twist for f in found]))[0]
+    basis = compute_range_basis(np.column_stack([f.twist for f in found]))[0]
     return twist - basis @ (basis.T @ twist)
 
 
 def _is_spanned(twist: Array, found: list[Freedom]) -> bool:
-    return bool(np.linalg.norm(_without(twist / np.linalg.norm(twist), found)) < NAMED)
+    return bool(np.linalg.norm(_remove_twist(twist / np.linalg.norm(twist), found)) < NAMED_TWIST_TOL)
 
 
-def directions_in(basis: Array, decomposition: LegDecomposition) -> list[Array]:
+def name_directions(basis: Array, decomposition: LegDecomposition) -> list[Array]:
     """Directions that span ``basis`` (3, k): base axes first, then P axes of the robot, then those normal to these."""
     candidates = [*np.eye(3)]
     candidates += [j.axis for j in decomposition.mechanism.joints.values() if j.type is JointType.PRISMATIC]
     chosen: list[Array] = []
     for candidate in candidates:
         inside = basis @ (basis.T @ candidate)
-        if len(chosen) < basis.shape[1] and np.linalg.norm(inside - candidate) < NAMED:
+        if len(chosen) < basis.shape[1] and np.linalg.norm(inside - candidate) < NAMED_TWIST_TOL:
             stacked = np.column_stack([*chosen, candidate])
-            if np.linalg.matrix_rank(stacked, tol=NAMED) == len(chosen) + 1:
-                chosen.append(orient_axis(unit(candidate)))
-    onto = range_basis(np.column_stack(chosen), 1.0)[0] if chosen else np.zeros((3, 0))
-    rest = space_basis(basis - onto @ (onto.T @ basis), 1.0)
-    return [*chosen, *(orient_axis(unit(each)) for each in rest.T)]
+            if np.linalg.matrix_rank(stacked, tol=NAMED_TWIST_TOL) == len(chosen) + 1:
+                chosen.append(orient_axis(normalise_vector(candidate)))
+    onto = compute_range_basis(np.column_stack(chosen), 1.0)[0] if chosen else np.zeros((3, 0))
+    rest = compute_space_basis(basis - onto @ (onto.T @ basis), 1.0)
+    return [*chosen, *(orient_axis(normalise_vector(each)) for each in rest.T)]
 
 
-def direction_name(direction: Array, decomposition: LegDecomposition) -> str:
+def name_direction(direction: Array, decomposition: LegDecomposition) -> str:
     for i in range(3):
-        if abs(abs(direction[i]) - 1) < NAMED:
+        if abs(abs(direction[i]) - 1) < NAMED_TWIST_TOL:
             return _AXES[i]
     along = [
         j.name
         for j in decomposition.mechanism.joints.values()
-        if j.type is JointType.PRISMATIC and np.linalg.norm(cross(j.axis, direction)) < NAMED
+        if j.type is JointType.PRISMATIC and np.linalg.norm(cross(j.axis, direction)) < NAMED_TWIST_TOL
     ]
-    return f"{point_text(direction)}, the axis of {along[0]}" if along else point_text(direction)
+    return f"{format_point(direction)}, the axis of {along[0]}" if along else format_point(direction)
 
 
-def _tips(decomposition: LegDecomposition, labels: tuple[str, ...] | None) -> list[tuple[str, Array]]:
+def _list_tips(decomposition: LegDecomposition, labels: tuple[str, ...] | None) -> list[tuple[str, Array]]:
     """The centre of each leg's joints on the platform, by label."""
     tips = []
     for leg in decomposition.legs:
@@ -136,16 +136,16 @@ def _tips(decomposition: LegDecomposition, labels: tuple[str, ...] | None) -> li
     return tips
 
 
-def _lines(decomposition: LegDecomposition, labels: tuple[str, ...] | None) -> list[tuple[Array, Array, str]]:
+def _list_lines(decomposition: LegDecomposition, labels: tuple[str, ...] | None) -> list[tuple[Array, Array, str]]:
     """Lines (point, direction, name) that an engineer would name."""
     mechanism = decomposition.mechanism
     origin = mechanism.links[mechanism.platform].pose[:3, 3]
-    tips = _tips(decomposition, labels)
+    tips = _list_tips(decomposition, labels)
     lines: list[tuple[Array, Array, str]] = []
     for i, (a, p) in enumerate(tips):
         for b, q in tips[i + 1 :]:
-            if np.linalg.norm(q - p) > NAMED:
-                lines.append((p, unit(q - p), f"the line B{a} B{b}"))
+            if np.linalg.norm(q - p) > NAMED_TWIST_TOL:
+                lines.append((p, normalise_vector(q - p), f"the line B{a} B{b}"))
     for axis, name in zip(np.eye(3), _AXES, strict=True):
         lines.append((origin, axis, f"the platform's {name} axis"))
     for joint in mechanism.joints.values():
@@ -160,15 +160,15 @@ def _lines(decomposition: LegDecomposition, labels: tuple[str, ...] | None) -> l
     return lines
 
 
-def _rotation(decomposition: LegDecomposition, point: Array, direction: Array) -> Array:
+def _build_rotation(decomposition: LegDecomposition, point: Array, direction: Array) -> Array:
     origin = decomposition.mechanism.links[decomposition.mechanism.platform].pose[:3, 3]
     return np.concatenate([cross(direction, origin - point), direction])
 
 
-def _screw(origin: Array, twist: Array) -> str:
+def _describe_screw(origin: Array, twist: Array) -> str:
     """The screw of a twist with unit angular part at ``origin``: its axis and pitch (m/rad)."""
     v, w = twist[:3], twist[3:]
     point = origin + cross(w, v)
     pitch = float(w @ v)
-    kind = "rotation" if abs(pitch) < NAMED else f"screw motion of pitch {pitch:.4g} m/rad"
-    return f"{kind} about the line through {point_text(point)} along {point_text(w)}"
+    kind = "rotation" if abs(pitch) < NAMED_TWIST_TOL else f"screw motion of pitch {pitch:.4g} m/rad"
+    return f"{kind} about the line through {format_point(point)} along {format_point(w)}"

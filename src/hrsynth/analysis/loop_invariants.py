@@ -9,7 +9,7 @@ branch, and T_qC = ker A there.
 
 The first-order condition is a polynomial identity in the numbers of which an instance is made. It is tested at
 instances, in whole numbers: one that fails refutes it, one that passes is wrong with a probability of at most the
-identity's degree divided by the range of the numbers (Schwartz and Zippel), of which :func:`degree` is a bound.
+identity's degree divided by the range of the numbers (Schwartz and Zippel), of which :func:`bound_degree` is a bound.
 """
 
 from __future__ import annotations
@@ -20,19 +20,21 @@ from itertools import groupby
 
 import numpy as np
 
-from ..geometry.vectors import Numbers, cross, dot, whole_multiple
+from ..geometry.vectors import Numbers, cross, dot, scale_to_whole
 from ..mechanism.incidences import Incidences
 from ..mechanism.structural_incidences import GeometricIncidence
 from .instances import Instance
 
 
-def are_kept(every: Sequence[GeometricIncidence], relations: Incidences, found: Instance) -> list[bool]:
+def find_invariant_incidences(
+    every: Sequence[GeometricIncidence], relations: Incidences, found: Instance
+) -> list[bool]:
     """Return the incidences that all motions of an instance preserve to first order."""
-    moving = _Moving(relations, found)
-    return [answer for _, group in groupby(every, key=_shape) for answer in moving.keeps(list(group))]
+    moving = _InstanceMotion(relations, found)
+    return [answer for _, group in groupby(every, key=_classify_incidence) for answer in moving.keeps(list(group))]
 
 
-def degree(relations: Incidences, rates: int) -> int:
+def bound_degree(relations: Incidences, rates: int) -> int:
     """A bound of the degree of the identities, and of all minors of a mechanism's maps, in the numbers drawn.
 
     Directions are minors of the rows that they obey, centres minors of the rows of all incidences, motions minors of
@@ -51,20 +53,20 @@ def degree(relations: Incidences, rates: int) -> int:
     return (rates + 5) * (centre + max(axes, default=0))
 
 
-def _shape(tie: GeometricIncidence) -> tuple[str, int, int]:
+def _classify_incidence(tie: GeometricIncidence) -> tuple[str, int, int]:
     """Relations of one shape are tested together."""
     return tie.kind if tie.sight is None else tie.sight.kind, len(tie.classes), len(tie.terms)
 
 
-class _Moving:
+class _InstanceMotion:
     """The geometry of an instance and its rates along a basis of ker A, centres and velocities of points times a common
     factor: values (…, 3, 1), rates (…, 3, mobility)."""
 
     def __init__(self, relations: Incidences, found: Instance) -> None:
         drawn = found.geometry
-        centres, factor = whole_multiple(drawn.centres.ravel())
+        centres, factor = scale_to_whole(drawn.centres.ravel())
         self.twists = found.twists()
-        self.D = np.array([whole_multiple(direction)[0] for direction in drawn.directions]).reshape(-1, 3, 1)
+        self.D = np.array([scale_to_whole(direction)[0] for direction in drawn.directions]).reshape(-1, 3, 1)
         turns = np.array([self.twists[links[0]][3:] for links in relations.fixed])
         self.dD = _cross(turns.reshape(len(self.D), 3, found.mobility), self.D)
         self.P = centres.reshape(-1, 3, 1)
@@ -86,9 +88,11 @@ class _Moving:
                 )
                 return _cross(spin, D[0])
             case "square":
-                return _rate(_dot, D[0], dD[0], D[1], dD[1])
+                return _derive_product_rate(_dot, D[0], dD[0], D[1], dD[1])
             case "plane":
-                return _rate(_dot, _cross(D[0], D[1]), _rate(_cross, D[0], dD[0], D[1], dD[1]), D[2], dD[2])
+                return _derive_product_rate(
+                    _dot, _cross(D[0], D[1]), _derive_product_rate(_cross, D[0], dD[0], D[1], dD[1]), D[2], dD[2]
+                )
             case "seen":
                 return self._directions(alike, D, dD)
         numbers = np.array([[number for number, _ in tie.terms] for tie in alike])
@@ -98,26 +102,28 @@ class _Moving:
             case "zero":
                 return np.asarray(dS)
             case "parallel":
-                return _rate(_cross, S, dS, D[0], dD[0])
+                return _derive_product_rate(_cross, S, dS, D[0], dD[0])
             case _:
-                return _rate(_dot, S, dS, D[0], dD[0])
+                return _derive_product_rate(_dot, S, dS, D[0], dD[0])
 
     def _directions(self, alike: list[GeometricIncidence], D: list[Numbers], dD: list[Numbers]) -> Numbers:
         """(ẇ − ω × w) × w of observed directions w."""
         sights = [tie.sight for tie in alike if tie.sight is not None]
         if sights[0].kind == "normal":
-            w, dw = _cross(D[0], D[1]), _rate(_cross, D[0], dD[0], D[1], dD[1])
+            w, dw = _cross(D[0], D[1]), _derive_product_rate(_cross, D[0], dD[0], D[1], dD[1])
         else:
             one, two = np.array([sight.points for sight in sights]).T
             w, dw = self.P[two] - self.P[one], self.dP[two] - self.dP[one]
         if sights[0].kind == "foot":
-            aside, rate = _cross(w, D[0]), _rate(_cross, w, dw, D[0], dD[0])
-            w, dw = _cross(D[0], aside), _rate(_cross, D[0], dD[0], aside, rate)
+            aside, rate = _cross(w, D[0]), _derive_product_rate(_cross, w, dw, D[0], dD[0])
+            w, dw = _cross(D[0], aside), _derive_product_rate(_cross, D[0], dD[0], aside, rate)
         spin = np.array([self.twists[tie.links[0]][3:] for tie in alike])
         return _cross(dw - _cross(spin, w), w)
 
 
-def _rate(times: Callable[[Numbers, Numbers], Numbers], a: Numbers, da: Numbers, b: Numbers, db: Numbers) -> Numbers:
+def _derive_product_rate(
+    times: Callable[[Numbers, Numbers], Numbers], a: Numbers, da: Numbers, b: Numbers, db: Numbers
+) -> Numbers:
     """The rate of a bilinear product."""
     return np.asarray(times(da, b) + times(a, db))
 

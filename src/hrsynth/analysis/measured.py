@@ -6,17 +6,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
-from ..budgets import REMEMBERED
-from ..constraints.condition import Condition, condition
-from ..constraints.excluded_poses import unexamined_poses
-from ..constraints.pattern import ConstraintPattern, moving, recognise
+from ..budgets import CACHED_OBSERVED_ROBOTS_COUNT
+from ..constraints.condition import Condition, derive_condition
+from ..constraints.excluded_poses import describe_excluded_poses
+from ..constraints.pattern import ConstraintPattern, describe_platform_motion, recognise
 from ..geometry.vectors import Array
 from ..kinematics.sampling import Samples
 from ..kinematics.velocity_relation import ObservationModel
-from ..mechanism.observation import labels_of
+from ..mechanism.observation import list_labels
 from ..results import Value
-from .observed import ObservedRobot, motors
-from .verdict import Verdict, verdict_of
+from .observed import ObservedRobot, build_motor_model
+from .verdict import Verdict, compute_verdict
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -27,16 +27,16 @@ class MeasuredRobot(Value):
     samples: Samples
 
     @classmethod
-    @lru_cache(maxsize=REMEMBERED)
+    @lru_cache(maxsize=CACHED_OBSERVED_ROBOTS_COUNT)
     def of_directions(cls, setup: ObservedRobot) -> MeasuredRobot:
         """The observed directions: the hidden robot."""
         return cls(setup, setup.samples)
 
     @classmethod
-    @lru_cache(maxsize=REMEMBERED)
+    @lru_cache(maxsize=CACHED_OBSERVED_ROBOTS_COUNT)
     def of_motors(cls, setup: ObservedRobot) -> MeasuredRobot:
         """The motors' coordinates: the real robot. Raises ``BadRequest`` where it has no motor."""
-        return cls(setup, setup.measuring(motors(setup).observations))
+        return cls(setup, setup.measuring(build_motor_model(setup).observations))
 
     @classmethod
     def of(cls, setup: ObservedRobot, real: bool) -> MeasuredRobot:
@@ -55,8 +55,8 @@ class MeasuredRobot(Value):
 
     @cached_property
     def verdict(self) -> Verdict:
-        """Generic verdict; raises ``RankUndecided``."""
-        return verdict_of(self.setup, labels_of(self.observation_model.observations), self.samples)
+        """Generic verdict; raises ``UndecidedRank``."""
+        return compute_verdict(self.setup, list_labels(self.observation_model.observations), self.samples)
 
     @cached_property
     def pattern(self) -> ConstraintPattern:
@@ -73,14 +73,16 @@ class MeasuredRobot(Value):
     @cached_property
     def moving(self) -> tuple[str, Array | None]:
         """Motion of the platform, one link, with nothing locked, and the normal if that is in a plane."""
-        return moving(self.setup.decomposition, self.observation_model, self.setup.configurations)
+        return describe_platform_motion(self.setup.decomposition, self.observation_model, self.setup.configurations)
 
     @cached_property
     def condition(self) -> Condition:
         """Condition under which a generically observed dof is unobserved."""
-        return condition(self.pattern, self.observation_model)
+        return derive_condition(self.pattern, self.observation_model)
 
     @cached_property
     def unexamined(self) -> tuple[str, ...]:
         """Poses to which the condition does not apply, in words."""
-        return unexamined_poses(self.setup.decomposition, self.pattern, self.condition, self.setup.configurations)
+        return describe_excluded_poses(
+            self.setup.decomposition, self.pattern, self.condition, self.setup.configurations
+        )

@@ -12,34 +12,40 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
 
-from ..budgets import REMEMBERED
+from ..budgets import CACHED_OBSERVED_ROBOTS_COUNT
 from ..description import load
-from ..description.observation_text import CAMERA, SEE, ObservationSpec, parse_camera, parse_see, with_sights
-from ..errors import BadMechanism, BadRequest, HrsynthError, NoSegment, NotSampled
-from ..geometry.ranks import range_bases
+from ..description.observation_text import CAMERA, SEE, ObservationSpec, add_observations, parse_camera, parse_see
+from ..errors import BadMechanism, BadRequest, HrsynthError, NoSegment, SamplingFailure
+from ..geometry.ranks import compute_range_bases
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.pinocchio_model import PinocchioModel
 from ..kinematics.platform_motion import PlatformMotion
 from ..kinematics.sampling import Sample, Samples, sample
-from ..kinematics.velocity_relation import ObservationModel, VelocityRelation, relation
+from ..kinematics.velocity_relation import ObservationModel, VelocityRelation, compute_relation
 from ..mechanism import Mechanism, Observation
 from ..mechanism.legs import LegDecomposition, decompose
 from ..mechanism.noise import Noise
-from ..mechanism.normal import NormalForm, normal_form
-from ..mechanism.observation import ObservationRecord, labels_of
+from ..mechanism.normal import NormalForm, reduce_to_normal_form
+from ..mechanism.observation import ObservationRecord, list_labels
 from ..mechanism.observations.direction import Direction
 from ..mechanism.pose import RADIANS, AskedPose, Pose, PoseForm, PoseLike
-from ..mechanism.sensors import default_observation, defaults_of, encoders, observation_of, reason
+from ..mechanism.sensors import (
+    choose_default_segment,
+    explain_default,
+    list_default_segments,
+    make_encoders,
+    observe_segment,
+)
 from ..options import OBSERVATION, option
 from ..progress import report
 from ..records import As, Record, Recorded, Shown
-from ..results import Value, content
+from ..results import Value, freeze_content
 
 if TYPE_CHECKING:
     from ..batch.configuration_builder import ConfigurationBuilder
     from ..batch.engine import Batch
 
-SAMPLES = 20
+GENERIC_SAMPLES_COUNT = 20
 """Number of samples of an equivalence check and of a generic verdict."""
 
 
@@ -143,7 +149,7 @@ class ObservedRobot(Value):
         *,
         sensor: SeeLike = None,
         candidate_sensor: SeeLike = None,
-        samples: int = SAMPLES,
+        samples: int = GENERIC_SAMPLES_COUNT,
         seed: int = 0,
         driven: bool = False,
         blind: bool = False,
@@ -152,8 +158,8 @@ class ObservedRobot(Value):
         :func:`.pose_requests.observe`, and ``candidate_sensor`` in the form of ``sensor``. Analyses of ``driven``
         motors need no segments: without any, the motor coordinates are observed; with ``blind``, and neither of them,
         nothing is."""
-        robot = as_robot(robot)
-        names = legs_asked(robot, observe, sensor)
+        robot = read_robot(robot)
+        names = list_requested_legs(robot, observe, sensor)
         if isinstance(robot, ObservedRobot):
             if (observe, camera, sensor, candidate_sensor) != (None,) * 4:
                 raise BadRequest(
@@ -165,19 +171,19 @@ class ObservedRobot(Value):
         robot.require_platform()
         report("sampling")
         try:
-            return _observed_robot(
+            return _build_observed_robot(
                 robot,
                 (robot.file, robot.notes),
                 names,
-                as_texts(camera),
-                as_texts(sensor),
-                as_texts(candidate_sensor),
+                normalise_texts(camera),
+                normalise_texts(sensor),
+                normalise_texts(candidate_sensor),
                 samples,
                 seed,
-                driven or (blind and any(joint.actuated for joint in robot.joints.values())),
+                driven or (blind and any(joint.is_actuated for joint in robot.joints.values())),
                 blind,
             )
-        except (BadMechanism, NotSampled) as error:
+        except (BadMechanism, SamplingFailure) as error:
             error.file = robot.file
             raise
 
@@ -192,7 +198,7 @@ class ObservedRobot(Value):
 
     def _said(self) -> tuple[Any, ...]:
         at = [each.q for each in (self.all_samples.start, *self.configurations)]
-        return self.robot, self.form, content(self.observed), content(at)
+        return self.robot, self.form, freeze_content(self.observed), freeze_content(at)
 
     def headline(self) -> str:
         """The robot and the observed legs."""
@@ -205,7 +211,7 @@ class ObservedRobot(Value):
         """Return the setup; raises ``BadRequest`` if something other than directions of segments in the reference link
         is observed, which is all that ``what`` supports."""
         for each in self.observed:
-            if not each.by_segment:
+            if not each.is_segment_direction:
                 raise BadRequest(
                     f"{self.robot.name}: {what} supports directions of segments only",
                     f"{each.kind} {each.leg}",
@@ -221,7 +227,7 @@ class ObservedRobot(Value):
     @property
     def labels(self) -> tuple[str, ...]:
         """The observed legs."""
-        return labels_of(self.observed)
+        return list_labels(self.observed)
 
     @property
     def segments(self) -> tuple[Observation, ...]:
@@ -231,7 +237,9 @@ class ObservedRobot(Value):
     @property
     def all_legs(self) -> tuple[Observation, ...]:
         """Segments of all legs: the default ones, and others that the file names."""
-        named = (o for o in self.mechanism.observations if o.by_segment and o.leg in self.decomposition.labels)
+        named = (
+            o for o in self.mechanism.observations if o.is_segment_direction and o.leg in self.decomposition.labels
+        )
         return tuple({o.key: o for o in (*self.segments, *named)}.values())
 
     @property
@@ -303,7 +311,7 @@ class ObservedRobot(Value):
         """Values that an internal motion does not change: the default segments of all legs, and other observations that
         are no segments."""
         more = self.all_samples.observation_model.observations[self.defaults :]
-        return *self.segments, *(each for each in more if not each.by_segment)
+        return *self.segments, *(each for each in more if not each.is_segment_direction)
 
     @cached_property
     def mobility_as_written(self) -> Mobility:
@@ -340,7 +348,7 @@ class ObservedRobot(Value):
         """Return the samples with ρ for other observations (and without paths)."""
         drawn = self.all_samples
         observation_model = replace(drawn.observation_model, observations=observations)
-        members = tuple(Sample(at, (), relation(at, observation_model)) for at in self.configurations)
+        members = tuple(Sample(at, (), compute_relation(at, observation_model)) for at in self.configurations)
         return replace(drawn, observation_model=observation_model, members=members)
 
     camera_record = Shown(
@@ -349,7 +357,7 @@ class ObservedRobot(Value):
 
     def observed_axes(self) -> tuple[tuple[Observation, str], ...]:
         """Observations, and the reasons for them."""
-        return tuple((each, reason(self.decomposition, each)) for each in self.observed)
+        return tuple((each, explain_default(self.decomposition, each)) for each in self.observed)
 
     @property
     def observed_record(self) -> list[ObservedAxis]:
@@ -439,7 +447,7 @@ RobotLike = Mechanism | ObservedRobot | str | Path
 """A robot as a user gives it: as it was read or observed, the path of its file, the name of a shipped one."""
 
 
-def as_robot(given: RobotLike) -> Mechanism | ObservedRobot:
+def read_robot(given: RobotLike) -> Mechanism | ObservedRobot:
     """The robot that is given; raises ``BadRequest``, and what ``load`` raises."""
     if isinstance(given, Mechanism | ObservedRobot):
         return given
@@ -453,7 +461,7 @@ def as_robot(given: RobotLike) -> Mechanism | ObservedRobot:
     )
 
 
-def as_names(given: LegsLike) -> tuple[str, ...] | None:
+def normalise_names(given: LegsLike) -> tuple[str, ...] | None:
     """The legs or links that are given, ``("all",)`` for all legs, None where nothing is; raises ``BadRequest``."""
     if given is None:
         return None
@@ -468,14 +476,17 @@ def as_names(given: LegsLike) -> tuple[str, ...] | None:
     return tuple(str(each).strip() for each in every)
 
 
-def legs_asked(robot: Mechanism | ObservedRobot, observe: LegsLike, sensor: SeeLike = None) -> tuple[str, ...] | None:
-    """Return :func:`as_names`, but None for all legs if only segments are observed: the same request in one form."""
-    names = as_names(observe)
+def list_requested_legs(
+    robot: Mechanism | ObservedRobot, observe: LegsLike, sensor: SeeLike = None
+) -> tuple[str, ...] | None:
+    """Return :func:`normalise_names`, but None for all legs if only segments are observed: the same request in one
+    form."""
+    names = normalise_names(observe)
     other = sensor is not None or (isinstance(robot, Mechanism) and bool(robot.observations))
     return None if names == ("all",) and not other else names
 
 
-def as_texts(given: str | Iterable[str] | None) -> tuple[str, ...]:
+def normalise_texts(given: str | Iterable[str] | None) -> tuple[str, ...]:
     """One text or several; raises ``BadRequest`` for what is none."""
     every = (
         ()
@@ -489,13 +500,13 @@ def as_texts(given: str | Iterable[str] | None) -> tuple[str, ...]:
     return every
 
 
-def forget_robots() -> None:
+def clear_robots() -> None:
     """Clear the cached samples."""
-    _observed_robot.cache_clear()
+    _build_observed_robot.cache_clear()
 
 
-@lru_cache(maxsize=REMEMBERED)
-def _observed_robot(
+@lru_cache(maxsize=CACHED_OBSERVED_ROBOTS_COUNT)
+def _build_observed_robot(
     robot: Mechanism,
     source: Hashable,
     observe: tuple[str, ...] | None,
@@ -508,29 +519,31 @@ def _observed_robot(
     blind: bool,
 ) -> ObservedRobot:
     """Return the same value for equal arguments and an equal robot from one ``source``: samples are computed once."""
-    robot, asked, possible = _seeing(robot, cameras, sensor, candidate_sensor)
-    normal = normal_form(robot)
+    robot, asked, possible = _add_sensors(robot, cameras, sensor, candidate_sensor)
+    normal = reduce_to_normal_form(robot)
     decomposition = decompose(normal.mechanism)
-    defaults = defaults_of(decomposition)
+    defaults = list_default_segments(decomposition)
     own = tuple(o for o in decomposition.mechanism.observations if o.leg not in asked | possible)
-    given = tuple(o for o in own if not o.by_segment)
+    given = tuple(o for o in own if not o.is_segment_direction)
     chosen = (
         ()
         if observe is None and asked
         else own
         if observe is None and own
         else (
-            _encoders_of(decomposition)
+            _list_encoders(decomposition)
             if driven and not defaults
             else ()
             if blind and not defaults
-            else _observations(decomposition, normal, defaults, observe, given)
+            else _choose_observations(decomposition, normal, defaults, observe, given)
         )
     )
     observed = (*chosen, *(o for o in decomposition.mechanism.observations if o.leg in asked))
     offered = tuple(o for o in decomposition.mechanism.observations if o.leg in possible)
     known = {o.key for o in defaults.values()}
-    named = tuple(o for o in own if o.by_segment)  # of legs that are not requested too: another set may contain them
+    named = tuple(
+        o for o in own if o.is_segment_direction
+    )  # of legs that are not requested too: another set may contain them
     extra = tuple({o.key: o for o in (*observed, *offered, *named) if o.key not in known}.values())
     first, *others = normal.mechanism.bodies
     observation_model = ObservationModel(
@@ -544,7 +557,7 @@ def _observed_robot(
     return ObservedRobot(robot, normal, decomposition, observed, drawn, len(defaults), offered=offered)
 
 
-def _seeing(
+def _add_sensors(
     robot: Mechanism, cameras: tuple[str, ...], sensor: tuple[str, ...], candidate_sensor: tuple[str, ...]
 ) -> tuple[Mechanism, set[str], set[str]]:
     """Add the requested and candidate cameras and observations to a robot; also return their labels."""
@@ -561,7 +574,7 @@ def _seeing(
         robot = replace(robot, camera=link)
     eyes = [each.name for each in named or robot.cameras]
     every = [("--sensor", text) for text in sensor] + [("--candidate-sensor", text) for text in candidate_sensor]
-    specs = [_spec(flag, text, eyes) for flag, text in every]
+    specs = [_parse_spec(flag, text, eyes) for flag, text in every]
     used = {each.camera for each in specs} & set(eyes)
     for camera in named:
         if camera.name not in used and (used or not specs):  # an inclination or an encoder alone needs none
@@ -569,11 +582,11 @@ def _seeing(
                 f"--camera {camera.name}: no observation uses this camera of {robot.name}",
                 remedy=f"Add --sensor {camera.name}=KIND:LINK…, or use --camera LINK for a camera that observes legs.",
             )
-    robot = with_sights(robot, (), named)
+    robot = add_observations(robot, (), named)
     labels: list[set[str]] = [{o.leg for o in robot.observations}]
     for (flag, text), spec in zip(every, specs, strict=True):
         try:
-            robot = with_sights(robot, [spec])
+            robot = add_observations(robot, [spec])
         except BadRequest as error:
             raise BadRequest(
                 f"{flag} {text}: {error.problem}", error.got, error.expected, remedy=error.remedy
@@ -582,7 +595,7 @@ def _seeing(
     return robot, set().union(*labels[1 : len(sensor) + 1]), set().union(*labels[len(sensor) + 1 :])
 
 
-def _spec(option: str, text: str, eyes: Sequence[str]) -> ObservationSpec:
+def _parse_spec(option: str, text: str, eyes: Sequence[str]) -> ObservationSpec:
     try:
         return parse_see(text, eyes)
     except BadRequest as error:
@@ -591,7 +604,7 @@ def _spec(option: str, text: str, eyes: Sequence[str]) -> ObservationSpec:
         ) from None
 
 
-def _observations(
+def _choose_observations(
     decomposition: LegDecomposition,
     normal: NormalForm,
     defaults: dict[str, Observation],
@@ -604,7 +617,7 @@ def _observations(
         for leg in decomposition.legs:
             if leg.label not in defaults:
                 try:
-                    default_observation(decomposition, leg)
+                    choose_default_segment(decomposition, leg)
                 except NoSegment:
                     if not defaults:
                         raise
@@ -616,22 +629,26 @@ def _observations(
         if others and name not in decomposition.labels:
             continue
         if name in decomposition.labels:
-            observation = defaults.get(name) or default_observation(decomposition, decomposition.leg(name))
-            chosen |= {o.key: o for o in decomposition.mechanism.observations if o.by_segment and o.leg == name}
+            observation = defaults.get(name) or choose_default_segment(decomposition, decomposition.leg(name))
+            chosen |= {
+                o.key: o for o in decomposition.mechanism.observations if o.is_segment_direction and o.leg == name
+            }
         elif name in normal.into:
             link = normal.into[name]
             if link not in decomposition.mechanism.links:
                 raise BadRequest(
                     f"--observe {name}: the link is part of a joint and has no direction", remedy="Name another link."
                 )
-            given = next((o for o in decomposition.mechanism.observations if o.link == link and o.by_segment), None)
-            observation = given or observation_of(decomposition, link)
+            given = next(
+                (o for o in decomposition.mechanism.observations if o.link == link and o.is_segment_direction), None
+            )
+            observation = given or observe_segment(decomposition, link)
         else:
             raise BadRequest(
                 f"--observe: leg or link of {decomposition.mechanism.name}",
                 name,
                 "legs "
-                + ", ".join([*decomposition.labels, *labels_of(given_too)])
+                + ", ".join([*decomposition.labels, *list_labels(given_too)])
                 + "; links "
                 + ", ".join(n for leg in decomposition.legs for n in leg.links),
             )
@@ -639,17 +656,17 @@ def _observations(
     return tuple(chosen.values())
 
 
-def motors(setup: ObservedRobot) -> ObservationModel:
+def build_motor_model(setup: ObservedRobot) -> ObservationModel:
     """Return the observation model of the robot's motors: their coordinates, as encoders measure them."""
-    return replace(setup.all_samples.observation_model, observations=_encoders_of(setup.decomposition))
+    return replace(setup.all_samples.observation_model, observations=_list_encoders(setup.decomposition))
 
 
-def _encoders_of(decomposition: LegDecomposition) -> tuple[Observation, ...]:
+def _list_encoders(decomposition: LegDecomposition) -> tuple[Observation, ...]:
     mechanism = decomposition.mechanism
     of = {name: leg.label for leg in decomposition.legs for name in leg.joints}
     mechanism.require_motors()
-    driven = [joint for joint in mechanism.joints.values() if joint.actuated]
-    return tuple(each for joint in driven for each in encoders(mechanism, joint, of.get(joint.name, "")))
+    driven = [joint for joint in mechanism.joints.values() if joint.is_actuated]
+    return tuple(each for joint in driven for each in make_encoders(mechanism, joint, of.get(joint.name, "")))
 
 
 def restrict_samples(samples: Samples, observations: Iterable[Observation], *, ways: bool = True) -> Samples:
@@ -683,5 +700,5 @@ def _select_relations(relations: Sequence[VelocityRelation], places: Sequence[in
         VelocityRelation(
             basis, each.twist_rows, tuple(each.sizes[i] for i in places), each.mobility, min(each.gap, rank.gap)
         )
-        for each, (basis, rank) in zip(relations, range_bases(rows, 1.0), strict=True)
+        for each, (basis, rank) in zip(relations, compute_range_bases(rows, 1.0), strict=True)
     ]

@@ -12,13 +12,13 @@ from math import ceil
 from typing import Any
 
 from ..errors import BadRequest, HrsynthError
-from ..mechanism.pose import AskedPose, PoseLike, asked_poses
+from ..mechanism.pose import AskedPose, PoseLike, parse_poses
 from ..processes import run_shared
 from ..progress import report
-from ..results import Result, brief
-from .observed import LegsLike, RobotLike, as_names, as_robot
+from ..results import Result, shorten_value
+from .observed import LegsLike, RobotLike, normalise_names, read_robot
 
-PARTS_EACH = 2
+PARTS_PER_PROCESS_MIN = 2
 """Minimum number of work items per process, if there are so many."""
 RAISE, KEEP = "raise", "keep"
 """Handling of an analysis that fails: raise its error, or keep it in place of the result."""
@@ -74,7 +74,7 @@ def map_robots(
     >>> hrsynth.map_robots("check", ["3rrr_m1"], poses=["x=0,phi=0", "x=0.01,phi=0"], legs=["1,2", "all"], jobs=1)[0]
     <Check: 3rrr_m1, observing 1, 2: x=0,y=0,z=0,phi=0deg regular, observes 2 of 3 dof>
     """
-    function: Callable[..., Any] = _function(observation_model)
+    function: Callable[..., Any] = _find_function(observation_model)
     if errors not in (RAISE, KEEP):
         raise BadRequest("errors", errors, (RAISE, KEEP))
     if jobs is not None and (isinstance(jobs, bool) or not isinstance(jobs, int) or jobs < 1):
@@ -82,11 +82,11 @@ def map_robots(
     several: Any = [robots] if isinstance(robots, str | os.PathLike) or not isinstance(robots, Iterable) else robots
     every = [_read(each, errors) for each in several]
     sets = [legs] if isinstance(legs, str) else legs
-    watched: list[Given] = [{}] if sets is None else [{"observe": as_names(each)} for each in sets]
-    asked: list[Given] = [{}] if poses is None else [{_place(function): each} for each in asked_poses(poses)]
+    watched: list[Given] = [{}] if sets is None else [{"observe": normalise_names(each)} for each in sets]
+    asked: list[Given] = [{}] if poses is None else [{_place(function): each} for each in parse_poses(poses)]
     groups = [{"robot": robot, **seen, **options} for robot, seen in product(every, watched)]
     workers = jobs or os.cpu_count() or 1
-    size = max(1, ceil(len(asked) / ceil(PARTS_EACH * workers / max(1, len(groups)))))
+    size = max(1, ceil(len(asked) / ceil(PARTS_PER_PROCESS_MIN * workers / max(1, len(groups)))))
     parts = [[{**group, **at} for at in asked[k : k + size]] for group in groups for k in range(0, len(asked), size)]
     answers: list[Any] = []
     with closing(
@@ -103,14 +103,14 @@ def map_robots(
 def _read(given: RobotLike, errors: str) -> RobotLike:
     """Read the robot once; if errors are kept, return one that cannot be read as it was given."""
     try:
-        return as_robot(given)
+        return read_robot(given)
     except HrsynthError:
         if errors == RAISE:
             raise
         return given
 
 
-def _function(observation_model: str | Callable[..., Any]) -> Callable[..., Any]:
+def _find_function(observation_model: str | Callable[..., Any]) -> Callable[..., Any]:
     if callable(observation_model):
         return observation_model
     try:
@@ -129,7 +129,7 @@ def _answer_part(function: Callable[..., Any], errors: str, part: list[Given]) -
     found: list[Any] = []
     for given in part:
         try:
-            found.append(function(**{**given, "robot": as_robot(given["robot"])}))
+            found.append(function(**{**given, "robot": read_robot(given["robot"])}))
         except Exception as error:
             error.add_note("request: " + ", ".join(f"{name} {_describe(value)}" for name, value in given.items()))
             if not isinstance(error, HrsynthError):
@@ -141,7 +141,7 @@ def _answer_part(function: Callable[..., Any], errors: str, part: list[Given]) -
 
 
 def _describe(value: Any) -> str:
-    return str(value) if isinstance(value, AskedPose | tuple) else brief(value)
+    return str(value) if isinstance(value, AskedPose | tuple) else shorten_value(value)
 
 
 def _place(function: Callable[..., Any]) -> str:

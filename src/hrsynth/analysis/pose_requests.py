@@ -7,17 +7,17 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ..batch.pose_continuation import reach
-from ..errors import BadRequest, HrsynthError, PoseNotReached
+from ..batch.pose_continuation import track_to_pose
+from ..errors import BadRequest, HrsynthError, PoseReachFailure
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.joint_coordinates import reach_joints
-from ..kinematics.locked_twists import rezero
+from ..kinematics.joint_coordinates import track_to_joints
+from ..kinematics.locked_twists import set_zero
 from ..mechanism.model import Mechanism
-from ..mechanism.pose import AskedPose, JointPose, ModeNumber, Pose, PoseLike, asked_pose
+from ..mechanism.pose import AskedPose, JointPose, ModeNumber, Pose, PoseLike, parse_pose
 from ..options import require_range
 from ..results import with_spelling
-from ..tolerances import AS_PRINTED
-from .observed import SAMPLES, CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, as_robot
+from ..tolerances import PRINTED_POSE_TOL
+from .observed import GENERIC_SAMPLES_COUNT, CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, read_robot
 
 if TYPE_CHECKING:
     from .modes.modes import AssemblyModes
@@ -31,7 +31,7 @@ def observe(
     *,
     sensor: SeeLike = None,
     at: PoseLike | None = None,
-    samples: int = SAMPLES,
+    samples: int = GENERIC_SAMPLES_COUNT,
     seed: int = 0,
 ) -> ObservedRobot:
     """Robot with observations, its normal form and samples of its motion: the starting point of every analysis.
@@ -67,7 +67,7 @@ def observe(
     ------
     BadRequest
         For unknown labels, links, parts of a pose and modes.
-    PoseNotReached
+    PoseReachFailure
         If the pose is not reached.
 
     Examples
@@ -78,7 +78,7 @@ def observe(
     >>> hrsynth.derive(robot).verdict == "controllable"
     False
     """
-    robot = as_robot(robot)
+    robot = read_robot(robot)
     require_range("seed", seed, "an integer", 0)
     if at is None:
         return ObservedRobot.of(robot, legs, camera, sensor=sensor, samples=samples, seed=seed)
@@ -89,13 +89,13 @@ def observe(
             remedy="Omit them: an observed robot already has its own.",
         )
     require_platform(robot, at)
-    asked = asked_pose(at)
+    asked = parse_pose(at)
     if isinstance(asked, Pose):
         start = _start_at(ObservedRobot.of(robot, seed=seed), asked)
     else:
-        (start,) = configurations_at(ObservedRobot.of(robot, legs, camera, sensor=sensor, seed=seed), [asked])
+        (start,) = solve_configurations(ObservedRobot.of(robot, legs, camera, sensor=sensor, seed=seed), [asked])
     return ObservedRobot.of(
-        replace(rezero(start), file=robot.file), legs, camera, sensor=sensor, samples=samples, seed=seed
+        replace(set_zero(start), file=robot.file), legs, camera, sensor=sensor, samples=samples, seed=seed
     )
 
 
@@ -115,14 +115,14 @@ def _start_at(setup: ObservedRobot, wanted: Pose) -> ClosedConfiguration:
     refused: HrsynthError | None = None
     for start in (drawn.start, *(mode.at for mode in drawn.other_modes)):
         try:
-            return reach(start, drawn.observation_model, wanted)
-        except (BadRequest, PoseNotReached) as error:
+            return track_to_pose(start, drawn.observation_model, wanted)
+        except (BadRequest, PoseReachFailure) as error:
             refused = refused or error
     assert refused is not None
     raise refused
 
 
-def configurations_at(
+def solve_configurations(
     setup: ObservedRobot, poses: Sequence[AskedPose], by_modes: bool = False
 ) -> list[ClosedConfiguration]:
     """Return the robot at each of the poses, or the error why it does not get there. ``mode:3`` is the third assembly
@@ -130,16 +130,16 @@ def configurations_at(
     lists them; with ``by_modes`` of the first that is reached, and a pose that small steps do not reach is then
     searched among its modes. Raises ``BadRequest`` for parts of a pose that the platform cannot change and for modes
     that do not exist."""
-    found = asked_at(setup, poses, by_modes)
+    found = solve_requested_poses(setup, poses, by_modes)
     for each in found:
-        if isinstance(each, PoseNotReached):
+        if isinstance(each, PoseReachFailure):
             raise each
     return [each for each in found if isinstance(each, ClosedConfiguration)]
 
 
-def asked_at(
+def solve_requested_poses(
     setup: ObservedRobot, poses: Sequence[AskedPose], by_modes: bool = False
-) -> list[ClosedConfiguration | PoseNotReached]:
+) -> list[ClosedConfiguration | PoseReachFailure]:
     """Return the robot at each of the poses, or the error why it does not get there. ``mode:3`` is the third assembly
     mode of the first pose among these that is given by its parts (without one, of the zero configuration), as ``modes``
     lists them; with ``by_modes`` of the first that is reached, and a pose that small steps do not reach is then
@@ -149,23 +149,24 @@ def asked_at(
         return []
     require_platform(setup.robot, poses[0])
     all_samples, motion = setup.all_samples, setup.motion
-    found: dict[AskedPose, ClosedConfiguration | PoseNotReached] = {}
+    found: dict[AskedPose, ClosedConfiguration | PoseReachFailure] = {}
     for each in poses:
         if not isinstance(each, ModeNumber):
             try:
                 if isinstance(each, JointPose):
-                    found[each] = reach_joints(all_samples.start, motion, each)
+                    found[each] = track_to_joints(all_samples.start, motion, each)
                 else:
-                    found[each] = reach(all_samples.start, all_samples.observation_model, each, motion)
-            except PoseNotReached as error:
+                    found[each] = track_to_pose(all_samples.start, all_samples.observation_model, each, motion)
+            except PoseReachFailure as error:
                 found[each] = error
     reached = [at for at in found.values() if isinstance(at, ClosedConfiguration)]
     about = next(iter(reached if by_modes else found.values()), all_samples.start)
-    unreached = {each: at for each, at in found.items() if isinstance(at, PoseNotReached) and isinstance(each, Pose)}
-    if isinstance(about, PoseNotReached):
+    unreached = {each: at for each, at in found.items() if isinstance(at, PoseReachFailure) and isinstance(each, Pose)}
+    if isinstance(about, PoseReachFailure):
         reason = f"it is an assembly mode of {about.pose}, which is not reached"
         return [
-            found.get(each) or PoseNotReached(about.robot, str(each), 0.0, about.last, reason=reason) for each in poses
+            found.get(each) or PoseReachFailure(about.robot, str(each), 0.0, about.last, reason=reason)
+            for each in poses
         ]
     if len(found) < len(set(poses)) or (by_modes and unreached):
         from .modes.modes import at_mode, modes
@@ -176,13 +177,13 @@ def asked_at(
                 if isinstance(each, ModeNumber):
                     found[each] = at_mode(listed, each)
                 elif by_modes and isinstance(each, Pose) and each in unreached:
-                    found[each] = _assembled_mode(listed, each, unreached[each])
-            except PoseNotReached as error:
+                    found[each] = _choose_assembled_mode(listed, each, unreached[each])
+            except PoseReachFailure as error:
                 found[each] = error
     return [found[each] for each in poses]
 
 
-def _assembled_mode(listed: AssemblyModes, pose: Pose, refused: PoseNotReached) -> ClosedConfiguration:
+def _choose_assembled_mode(listed: AssemblyModes, pose: Pose, refused: PoseReachFailure) -> ClosedConfiguration:
     """The robot at the one mode with this pose at which it was found assembled; raises ``refused`` if there is none."""
     from .modes.modes import at_mode
 
@@ -193,7 +194,7 @@ def _assembled_mode(listed: AssemblyModes, pose: Pose, refused: PoseNotReached) 
         for number, mode in enumerate(listed.modes, 1)
         if mode.configuration is not None
         and mode.reachable
-        and wanted.is_met(mode.configuration.pose(motion.link), AS_PRINTED * max(1.0, model.length))
+        and wanted.is_met(mode.configuration.pose(motion.link), PRINTED_POSE_TOL * max(1.0, model.length))
     ]
     if len(met) != 1:
         raise refused

@@ -12,14 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..geometry.vectors import Numbers, whole_multiple
+from ..geometry.vectors import Numbers, scale_to_whole
 from ..mechanism import Direction, Mechanism, Observation
 from ..mechanism.cameras import CameraObservation, ViewGeometry
 from ..mechanism.incidences import Incidences
 from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.observations.encoder import AngleEncoder, Encoder
 
-DEGREE = 4
+WRENCH_DEGREE_MAX = 4
 """No wrench of a kind has a larger degree in points and directions together, each counted as the largest of them."""
 
 Place = tuple[str, tuple[float, ...]]
@@ -39,9 +39,9 @@ class SensorPlaces:
         points: dict[Place, None] = {}
         directions: dict[Place, None] = {}
         for each in observations:
-            for point in _points(each, mechanism):
+            for point in _list_points(each, mechanism):
                 points[point] = None
-            for direction in _directions(each, mechanism):
+            for direction in _list_directions(each, mechanism):
                 directions[direction] = None
         return cls(tuple(points), tuple(directions))
 
@@ -55,7 +55,7 @@ def has_exact_rates(seen: Observation) -> bool:
     return isinstance(seen, SeenAxis | Encoder) or (isinstance(seen, CameraObservation) and seen.rational)
 
 
-def sighting(
+def build_view_geometry(
     seen: Observation,
     places: SensorPlaces,
     relations: Incidences,
@@ -75,13 +75,14 @@ def sighting(
     if not isinstance(seen, CameraObservation):
         return None
     B, C = (
-        centres[relations.count - len(places.points) + places.points.index(point)] for point in _points(seen, mechanism)
+        centres[relations.count - len(places.points) + places.points.index(point)]
+        for point in _list_points(seen, mechanism)
     )
-    axes = [sights[places.directions.index(axis)] for axis in _directions(seen, mechanism)]
+    axes = [sights[places.directions.index(axis)] for axis in _list_directions(seen, mechanism)]
     return ViewGeometry(C, axes[-1] if axes else nothing, B, axes[0] if seen.axis is not None else nothing)
 
 
-def rates(
+def compute_observation_rates(
     seen: Observation,
     at: ViewGeometry | None,
     mechanism: Mechanism,
@@ -93,21 +94,21 @@ def rates(
     total = next(iter(velocities.values())).shape[1]
     if isinstance(seen, Encoder):
         row = np.zeros((1, total), dtype=object)
-        row[0, columns[seen.joint].start + _coordinate(seen, mechanism)] = 1
+        row[0, columns[seen.joint].start + _find_coordinate(seen, mechanism)] = 1
         return row
     assert isinstance(seen, CameraObservation)
     assert at is not None
     turn = velocities[seen.link] - velocities[seen.seen_from or mechanism.reference]
-    return np.vstack([_whole(wrench) @ turn for wrench in seen.wrenches(at)])
+    return np.vstack([_scale_to_whole(wrench) @ turn for wrench in seen.wrenches(at)])
 
 
-def _whole(wrench: Numbers) -> Numbers:
+def _scale_to_whole(wrench: Numbers) -> Numbers:
     from flint import fmpq
 
-    return whole_multiple(np.array([fmpq(x) for x in wrench], dtype=object))[0]
+    return scale_to_whole(np.array([fmpq(x) for x in wrench], dtype=object))[0]
 
 
-def _coordinate(seen: Encoder, mechanism: Mechanism) -> int:
+def _find_coordinate(seen: Encoder, mechanism: Mechanism) -> int:
     """Return the index of an encoder's coordinate among those of its joint."""
     joint = mechanism.joints[seen.joint]
     if joint.type == "U":
@@ -115,7 +116,7 @@ def _coordinate(seen: Encoder, mechanism: Mechanism) -> int:
     return int(isinstance(seen, AngleEncoder) and joint.type == "C")
 
 
-def _points(seen: Observation, mechanism: Mechanism) -> tuple[Place, ...]:
+def _list_points(seen: Observation, mechanism: Mechanism) -> tuple[Place, ...]:
     """B and C."""
     if not isinstance(seen, CameraObservation):
         return ()
@@ -123,7 +124,7 @@ def _points(seen: Observation, mechanism: Mechanism) -> tuple[Place, ...]:
     return (seen.link, tuple(seen.at.tolist())), (reference, tuple(seen.view[:3, 3].tolist()))
 
 
-def _directions(seen: Observation, mechanism: Mechanism) -> tuple[Place, ...]:
+def _list_directions(seen: Observation, mechanism: Mechanism) -> tuple[Place, ...]:
     """d, where there is one; the camera's z axis, where the depth is measured."""
     if not isinstance(seen, CameraObservation):
         return ()

@@ -9,12 +9,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..geometry.ranks import Rank, range_basis, rank_of
+from ..geometry.ranks import Rank, compute_range_basis, rank_of
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.velocity_relation import VelocityRelation
 from ..records import Record
-from ..tolerances import RANK_GAP
+from ..tolerances import RANK_GAP_MIN
 
 
 @dataclass(frozen=True)
@@ -31,19 +31,19 @@ class Counts:
     @classmethod
     def of(cls, found: VelocityRelation) -> Counts:
         """The counts of a relation."""
-        seen = range_basis(found.rates, 1.0)[1].value
+        seen = compute_range_basis(found.rates, 1.0)[1].value
         return cls(found.mobility, found.dimension, found.dof.value, seen, found.RO.value, found.RI)
 
 
-def generic(counts: Sequence[Counts]) -> Counts:
+def find_generic_counts(counts: Sequence[Counts]) -> Counts:
     """The most frequent counts; of equally frequent ones those of the smallest mobility, then of the highest rank."""
     often = Counter(counts)
     return max(often, key=lambda each: (often[each], -each.mobility, each.relation, each.seen))
 
 
-def gap_of(found: VelocityRelation) -> float:
+def find_smallest_gap(found: VelocityRelation) -> float:
     """Smallest rank gap of the indices."""
-    return min(found.gap, found.dof.gap, found.RO.gap, range_basis(found.rates, 1.0)[1].gap)
+    return min(found.gap, found.dof.gap, found.RO.gap, compute_range_basis(found.rates, 1.0)[1].gap)
 
 
 @dataclass(frozen=True)
@@ -75,22 +75,22 @@ class SingularityIndices(Record, all_recorded=True):
         )
 
     @property
-    def type1(self) -> bool:
+    def is_type1(self) -> bool:
         """Measured values change while the platform is fixed (RI > 0)."""
         return self.RI > 0
 
     @property
-    def type2(self) -> bool:
+    def is_type2(self) -> bool:
         """The platform moves while the measured values are constant (RO > 0)."""
         return self.RO > 0
 
     @property
-    def type3(self) -> bool:
+    def is_type3(self) -> bool:
         """Both."""
-        return self.type1 and self.type2
+        return self.is_type1 and self.is_type2
 
 
-def interaction_matrix(found: VelocityRelation) -> Array | None:
+def compute_interaction_matrix(found: VelocityRelation) -> Array | None:
     """Mᵀ (rates, dof) on the basis ``found.twists`` of the feasible twists (MMT eq. 7; lengths in characteristic
     lengths); None where it does not exist."""
     if found.RI:
@@ -112,7 +112,7 @@ Rows = tuple[tuple[str, int], ...]
 """Name of each loop with its number of redundant rows, in the order of the model's loops."""
 
 
-def redundant_rows(at: ClosedConfiguration) -> Rows:
+def count_redundant_rows(at: ClosedConfiguration) -> Rows:
     """Redundant rows of each loop, counted greedily in the order of ``PinocchioModel.loops``: all rows of a loop but
     those by which it raises the rank of the loops before it. Empty where a rank is not decided."""
     J = at.model.jacobian(at.q)
@@ -120,7 +120,7 @@ def redundant_rows(at: ClosedConfiguration) -> Rows:
     scale = float(np.linalg.norm(J, 2)) if J.size else 1.0
     ranks = [Rank(0, np.inf)]
     ranks += [rank_of(np.asarray(np.linalg.svd(J[:end], compute_uv=False)), scale) for end in np.cumsum(sizes)]
-    if min(rank.gap for rank in ranks) < RANK_GAP:
+    if min(rank.gap for rank in ranks) < RANK_GAP_MIN:
         return ()
     return tuple(
         (name, size - (after.value - before.value))
@@ -128,13 +128,13 @@ def redundant_rows(at: ClosedConfiguration) -> Rows:
     )
 
 
-def usual_rows(configurations: Iterable[ClosedConfiguration]) -> Rows:
+def find_generic_rows(configurations: Iterable[ClosedConfiguration]) -> Rows:
     """The redundant rows of each loop at most of the configurations."""
-    found = Counter(rows for at in configurations if (rows := redundant_rows(at)))
+    found = Counter(rows for at in configurations if (rows := count_redundant_rows(at)))
     return max(found, key=lambda rows: found[rows], default=())
 
 
-def surplus(here: Rows, usual: Rows) -> Rows:
+def subtract_generic_rows(here: Rows, usual: Rows) -> Rows:
     """The rows that are redundant here and not in general: as many as the loops lose rank, each with the loop from
     which on the loss stays."""
     more = np.cumsum([count - often for (_, count), (_, often) in zip(here, usual, strict=False)])

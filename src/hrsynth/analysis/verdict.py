@@ -6,15 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, NamedTuple
 
-from ..errors import RankUndecided
+from ..errors import UndecidedRank
 from ..geometry.ranks import Rank
 from ..kinematics.sampling import Samples
-from ..kinematics.velocity_relation import VelocityRelation, look, relation
+from ..kinematics.velocity_relation import VelocityRelation, compute_relation, look
 from ..records import GAP, OPTIONAL, Recorded, Shown, Word, recorded
 from ..results import Result
-from ..tolerances import RANK_CUTOFF, RANK_GAP, SURELY_SOMETHING, SURELY_ZERO
-from .formation import Formation, formation_at
-from .freedoms import Freedom, name_freedoms, point_text
+from ..tolerances import NONZERO_SINGULAR_VALUE_MIN, RANK_CUTOFF_FRACTION, RANK_GAP_MIN, ZERO_SINGULAR_VALUE_MAX
+from .formation import Formation, analyze_formation
+from .freedoms import Freedom, format_point, name_freedoms
 from .observed import ObservedRobot
 
 CONTROLLABLE, PARTIAL, BLIND = "controllable", "partially controllable", "uncontrollable"
@@ -24,7 +24,7 @@ ELSEWHERE = "with the platform at"
 """Suffix of an unobserved dof's name if the zero configuration is not generic."""
 
 
-def word(rank: int, dof: int) -> str:
+def name_controllability(rank: int, dof: int) -> str:
     """Return the verdict for ``rank`` of ``dof`` observed platform dof."""
     if not dof:
         return AT_REST
@@ -63,9 +63,11 @@ class Verdict(Result, shown_as="verdict"):
     or for several platform links."""
 
     @property
-    def near(self) -> bool:
+    def is_near_cutoff(self) -> bool:
         """True if a singular value is so near the cutoff that slightly different geometry has another verdict."""
-        return (self.rank > 0 and self.smallest_kept < SURELY_SOMETHING) or self.largest_dropped > SURELY_ZERO
+        return (
+            self.rank > 0 and self.smallest_kept < NONZERO_SINGULAR_VALUE_MIN
+        ) or self.largest_dropped > ZERO_SINGULAR_VALUE_MAX
 
     @property
     def named(self) -> str:
@@ -89,13 +91,13 @@ class Verdict(Result, shown_as="verdict"):
     @recorded()
     def margin(self) -> Margin:
         """Smallest singular value that counts, largest that does not, and the cutoff."""
-        return Margin(self.smallest_kept, self.largest_dropped, RANK_CUTOFF)
+        return Margin(self.smallest_kept, self.largest_dropped, RANK_CUTOFF_FRACTION)
 
 
-def verdict_of(setup: ObservedRobot, legs: Sequence[str], samples: Samples) -> Verdict:
+def compute_verdict(setup: ObservedRobot, legs: Sequence[str], samples: Samples) -> Verdict:
     """The verdict for ``samples``, whose observations are those of ``legs``.
 
-    All samples are of one operation mode and must show one rank. Raises ``RankUndecided`` where its gap is too small at
+    All samples are of one operation mode and must show one rank. Raises ``UndecidedRank`` where its gap is too small at
     a sample, or between what counts at one sample and what does not at another.
     """
     found = [member.relation for member in samples.members]
@@ -104,20 +106,20 @@ def verdict_of(setup: ObservedRobot, legs: Sequence[str], samples: Samples) -> V
     what = f"the rank of legs {', '.join(legs)}"
     if any(each.rank != rank for each in found):
         between = min(each.seen.weakest for each in found) / max(each.seen.dropped for each in found)
-        raise RankUndecided(f"{what} is not the same at all configurations", between, RANK_GAP)
+        raise UndecidedRank(f"{what} is not the same at all configurations", between, RANK_GAP_MIN)
     gap = min(min(each.gap, each.RO.gap) for each in found)
     Rank(rank, gap).decided(what)
     dof = setup.dof
     lost, formation, at_zero = tuple[Freedom, ...](), None, None
-    start = relation(samples.start, samples.observation_model)
+    start = compute_relation(samples.start, samples.observation_model)
     if setup.mechanism.formation:
-        formation = _formation(setup, samples, start, dof - rank)
+        formation = _analyze_formation(setup, samples, start, dof - rank)
     else:
         shown = max(dof - start.unobserved_twists.shape[1], 0)
-        at_zero = shown if shown < rank and start.gap >= RANK_GAP else None
-        lost = _lost_freedoms(setup, samples, start, tuple(legs), dof - rank) if rank < dof else ()
+        at_zero = shown if shown < rank and start.gap >= RANK_GAP_MIN else None
+        lost = _list_unobserved(setup, samples, start, tuple(legs), dof - rank) if rank < dof else ()
     graph = not any(each.RI for each in found)
-    said = word(rank, dof) if formation is None else formation.verdict
+    said = name_controllability(rank, dof) if formation is None else formation.verdict
     return Verdict(
         tuple(legs),
         said,
@@ -133,24 +135,24 @@ def verdict_of(setup: ObservedRobot, legs: Sequence[str], samples: Samples) -> V
     )
 
 
-def _formation(setup: ObservedRobot, samples: Samples, start: VelocityRelation, count: int) -> Formation:
+def _analyze_formation(setup: ObservedRobot, samples: Samples, start: VelocityRelation, count: int) -> Formation:
     """Return the unobserved motions of a formation, at the zero configuration (ρ there: ``start``) if it is generic,
     else at a sample."""
     member = samples.members[0]
-    usual = formation_at(member.configuration, samples.observation_model, member.relation, setup.decomposition)
-    if start.unobserved_twists.shape[1] != count or start.gap < RANK_GAP:
+    usual = analyze_formation(member.configuration, samples.observation_model, member.relation, setup.decomposition)
+    if start.unobserved_twists.shape[1] != count or start.gap < RANK_GAP_MIN:
         return usual
-    found = formation_at(samples.start, samples.observation_model, start, setup.decomposition)
+    found = analyze_formation(samples.start, samples.observation_model, start, setup.decomposition)
     return found if len(found.trivial) == len(usual.trivial) else usual
 
 
-def _lost_freedoms(
+def _list_unobserved(
     setup: ObservedRobot, samples: Samples, start: VelocityRelation, legs: tuple[str, ...], count: int
 ) -> tuple[Freedom, ...]:
     """Return the unobserved dof at the zero configuration (ρ there: ``start``) if it is generic, else at a sample."""
     position = None
     found = start.unobserved_twists
-    if found.shape[1] != count or start.gap < RANK_GAP:
+    if found.shape[1] != count or start.gap < RANK_GAP_MIN:
         member = next(member for member in samples.members if member.relation.unobserved_twists.shape[1] == count)
         found, position = (
             member.relation.unobserved_twists,
@@ -159,4 +161,4 @@ def _lost_freedoms(
     named = name_freedoms(found, setup.decomposition, legs, position)
     if position is None:
         return named
-    return tuple(replace(each, name=f"{each.name} ({ELSEWHERE} {point_text(position)} m)") for each in named)
+    return tuple(replace(each, name=f"{each.name} ({ELSEWHERE} {format_point(position)} m)") for each in named)

@@ -21,22 +21,22 @@ from numpy.typing import NDArray
 from ..budgets import BOX_STEPS_IN_NUMPY, BOXES_A_CALL
 from ..geometry import affine
 from ..geometry.affine import (
-    FARTHEST_TURN,
+    EXACT_SINE_ANGLE_MAX_RAD,
     AffineForms,
-    inverse_line,
-    line_radius,
-    product_radius,
-    root_line,
-    rounded_radius,
-    scaled_radius,
-    sine_line,
+    bound_inverse,
+    bound_line,
+    bound_product,
+    bound_root,
+    bound_scaled,
+    bound_sine,
+    reduce_sines,
+    round_radius,
     spread,
-    turned_sines,
 )
 from ..geometry.vectors import Array
 from ..results import Value
-from .program import compiled_module
-from .tape import LANES
+from .program import load_compiled_module
+from .tape import TAPE_LANES_COUNT
 
 Places = NDArray[np.int64]
 Term = tuple[float, float]
@@ -46,15 +46,15 @@ LOAD, ADD, SUBTRACT, MULTIPLY, SCALE, COPY, SHIFT, NEGATE, INVERT, ROOT, SINES, 
 _NAMES = {"+": ADD, "-": SUBTRACT, "*": MULTIPLY, "sqrt": ROOT}
 _NUMBERS = "AFFINE_ROUNDING", "HALF_PI", "FARTHEST_TURN", "SINE_SERIES", "COSINE_SERIES"
 _FUNCTIONS = (
-    rounded_radius,
+    round_radius,
     spread,
-    product_radius,
-    scaled_radius,
-    inverse_line,
-    root_line,
-    line_radius,
-    sine_line,
-    turned_sines,
+    bound_product,
+    bound_scaled,
+    bound_inverse,
+    bound_root,
+    bound_line,
+    bound_sine,
+    reduce_sines,
 )
 _TEXT = """from __future__ import annotations
 
@@ -79,15 +79,15 @@ class Work:
     done = 0
 
 
-def worth(steps: int, boxes: int) -> bool:
+def is_numba_worthwhile(steps: int, boxes: int) -> bool:
     """Return True if numba is installed, and worth its start: after enough work in NumPy, where each step costs as much
     as some hundred boxes before the first. Sums of one box have another order there."""
     Work.done += steps * (boxes + BOXES_A_CALL)
-    return Work.done > BOX_STEPS_IN_NUMPY and boxes > 1 and _compilable()
+    return Work.done > BOX_STEPS_IN_NUMPY and boxes > 1 and _has_numba()
 
 
 @lru_cache(maxsize=1)
-def _compilable() -> bool:
+def _has_numba() -> bool:
     """Return True if numba is installed."""
     return find_spec("numba") is not None
 
@@ -184,150 +184,152 @@ class MachineCode(Value):
             row[:S], row[S] = each.v, each.r
         bends = np.array([0 if each.bend is None else each.bend for each in inputs], dtype=np.int64)
         found = np.empty((S + 1, c, len(self.outputs)))
-        _compiled_machine()(self.instructions, self.numbers, self.places, self.outputs, given, bends, found)
+        _compile_machine()(self.instructions, self.numbers, self.places, self.outputs, given, bends, found)
         return AffineForms(found[:S], found[S])
 
 
-def machine(
+def run_instructions(
     code: Places, numbers: Array, places: int, outputs: Places, given: Array, bends: Places, found: Array
 ) -> None:
     """Run instructions on forms ``given`` (inputs, symbols + 2, boxes), whose angles' bends have the symbols ``bends``
     (0 for none), to what is ``found`` (symbols + 2, boxes, outputs)."""
     rows, boxes = given.shape[1] - 1, given.shape[2]
-    m = np.zeros((places, rows + 1, LANES))
+    m = np.zeros((places, rows + 1, TAPE_LANES_COUNT))
     total, slopes_a, slopes_b, both, shared = (
-        np.zeros(LANES),
-        np.zeros(LANES),
-        np.zeros(LANES),
-        np.zeros(LANES),
-        np.zeros(LANES),
+        np.zeros(TAPE_LANES_COUNT),
+        np.zeros(TAPE_LANES_COUNT),
+        np.zeros(TAPE_LANES_COUNT),
+        np.zeros(TAPE_LANES_COUNT),
+        np.zeros(TAPE_LANES_COUNT),
     )
-    for start in range(0, boxes, LANES):
-        count = min(LANES, boxes - start)
+    for start in range(0, boxes, TAPE_LANES_COUNT):
+        count = min(TAPE_LANES_COUNT, boxes - start)
         for step in range(code.shape[0]):
             name, number = code[step, 0], code[step, 3]
             to, a, b = m[code[step, 1]], m[code[step, 2]], m[min(number, places - 1)]
             if name == LOAD:
                 for s in range(rows + 1):
-                    for i in range(LANES):
+                    for i in range(TAPE_LANES_COUNT):
                         to[s, i] = given[code[step, 4], s, start + min(i, count - 1)]
             elif name == ADD:
-                for i in range(LANES):
+                for i in range(TAPE_LANES_COUNT):
                     total[i] = 0.0
                 for s in range(rows):
-                    for i in range(LANES):
+                    for i in range(TAPE_LANES_COUNT):
                         to[s, i] = a[s, i] + b[s, i]
                         total[i] += abs(to[s, i])
-                for i in range(LANES):
-                    to[rows, i] = rounded_radius(a[rows, i] + b[rows, i], total[i])
+                for i in range(TAPE_LANES_COUNT):
+                    to[rows, i] = round_radius(a[rows, i] + b[rows, i], total[i])
             elif name == SUBTRACT:
-                for i in range(LANES):
+                for i in range(TAPE_LANES_COUNT):
                     total[i] = 0.0
                 for s in range(rows):
-                    for i in range(LANES):
+                    for i in range(TAPE_LANES_COUNT):
                         to[s, i] = a[s, i] - b[s, i]
                         total[i] += abs(to[s, i])
-                for i in range(LANES):
-                    to[rows, i] = rounded_radius(a[rows, i] + b[rows, i], total[i])
+                for i in range(TAPE_LANES_COUNT):
+                    to[rows, i] = round_radius(a[rows, i] + b[rows, i], total[i])
             elif name == MULTIPLY:
-                for i in range(LANES):
+                for i in range(TAPE_LANES_COUNT):
                     slopes_a[i] = slopes_b[i] = both[i] = shared[i] = 0.0
                 for s in range(1, rows):
-                    for i in range(LANES):
+                    for i in range(TAPE_LANES_COUNT):
                         x, y = a[s, i], b[s, i]
                         slopes_a[i] += abs(x)
                         slopes_b[i] += abs(y)
                         both[i] += x * y
                         shared[i] += abs(x * y)
                         to[s, i] = x * b[0, i] + y * a[0, i]
-                for i in range(LANES):
+                for i in range(TAPE_LANES_COUNT):
                     to[0, i] = a[0, i] * b[0, i] + 0.5 * both[i]
-                    to[rows, i] = product_radius(
+                    to[rows, i] = bound_product(
                         a[0, i], slopes_a[i], a[rows, i], b[0, i], slopes_b[i], b[rows, i], shared[i]
                     )
             elif name == SCALE:
                 factor, doubt = numbers[number, 0], numbers[number, 1]
-                sizes(a, 0, rows, total)
+                sum_sizes(a, 0, rows, total)
                 for s in range(rows):
-                    for i in range(LANES):
+                    for i in range(TAPE_LANES_COUNT):
                         to[s, i] = a[s, i] * factor
-                for i in range(LANES):
-                    to[rows, i] = scaled_radius(total[i], a[rows, i], factor, doubt)
+                for i in range(TAPE_LANES_COUNT):
+                    to[rows, i] = bound_scaled(total[i], a[rows, i], factor, doubt)
             elif name in (COPY, SHIFT):
                 for s in range(rows + 1):
-                    for i in range(LANES):
+                    for i in range(TAPE_LANES_COUNT):
                         to[s, i] = a[s, i]
                 if name == SHIFT:
-                    for i in range(LANES):
+                    for i in range(TAPE_LANES_COUNT):
                         to[0, i] += numbers[number, 0]
-                        to[rows, i] = rounded_radius(to[rows, i] + numbers[number, 1], abs(to[0, i]))
+                        to[rows, i] = round_radius(to[rows, i] + numbers[number, 1], abs(to[0, i]))
             elif name == NEGATE:
                 for s in range(rows):
-                    for i in range(LANES):
+                    for i in range(TAPE_LANES_COUNT):
                         to[s, i] = -a[s, i]
-                for i in range(LANES):
+                for i in range(TAPE_LANES_COUNT):
                     to[rows, i] = a[rows, i]
             elif name in (INVERT, ROOT):
-                sizes(a, 1, rows, total)
-                for i in range(LANES):
+                sum_sizes(a, 1, rows, total)
+                for i in range(TAPE_LANES_COUNT):
                     width = spread(total[i], a[rows, i])
-                    line = inverse_line(a[0, i], width) if name == INVERT else root_line(a[0, i], width)
+                    line = bound_inverse(a[0, i], width) if name == INVERT else bound_root(a[0, i], width)
                     slopes_a[i], slopes_b[i], both[i], shared[i] = line
                 for s in range(rows):
-                    for i in range(LANES):
+                    for i in range(TAPE_LANES_COUNT):
                         to[s, i] = a[s, i] * slopes_a[i]
-                for i in range(LANES):
+                for i in range(TAPE_LANES_COUNT):
                     to[0, i] += slopes_b[i]
-                sizes(to, 0, rows, total)
-                for i in range(LANES):
-                    to[rows, i] = line_radius(a[rows, i], slopes_a[i], both[i], shared[i], total[i])
+                sum_sizes(to, 0, rows, total)
+                for i in range(TAPE_LANES_COUNT):
+                    to[rows, i] = bound_line(a[rows, i], slopes_a[i], both[i], shared[i], total[i])
             elif name == SINES:
                 bend = bends[code[step, 4]] if code[step, 4] >= 0 else 0
-                sizes(a, 1, rows, total)
-                for i in range(LANES):
-                    sine, cosine = turned_sines(a[0, i])
-                    slopes_a[i] = sine if abs(a[0, i]) <= FARTHEST_TURN else nan
-                    slopes_b[i] = cosine if abs(a[0, i]) <= FARTHEST_TURN else nan
+                sum_sizes(a, 1, rows, total)
+                for i in range(TAPE_LANES_COUNT):
+                    sine, cosine = reduce_sines(a[0, i])
+                    slopes_a[i] = sine if abs(a[0, i]) <= EXACT_SINE_ANGLE_MAX_RAD else nan
+                    slopes_b[i] = cosine if abs(a[0, i]) <= EXACT_SINE_ANGLE_MAX_RAD else nan
                 for s in range(1, rows):
-                    for i in range(LANES):
+                    for i in range(TAPE_LANES_COUNT):
                         to[s, i] = a[s, i] * slopes_b[i]
                         b[s, i] = a[s, i] * -slopes_a[i]
-                for i in range(LANES):
+                for i in range(TAPE_LANES_COUNT):
                     r, width = a[rows, i], spread(total[i], a[rows, i])
-                    to[0, i], along, to[rows, i] = sine_line(slopes_a[i], slopes_b[i], r, width, bend > 0)
-                    b[0, i], aside, b[rows, i] = sine_line(slopes_b[i], -slopes_a[i], r, width, bend > 0)
+                    to[0, i], along, to[rows, i] = bound_sine(slopes_a[i], slopes_b[i], r, width, bend > 0)
+                    b[0, i], aside, b[rows, i] = bound_sine(slopes_b[i], -slopes_a[i], r, width, bend > 0)
                     if bend > 0:
                         to[bend, i] += along
                         b[bend, i] += aside
             else:
                 to[:] = 0.0
-                for i in range(LANES):
+                for i in range(TAPE_LANES_COUNT):
                     to[0, i] = numbers[number, 0]
-                    to[rows, i] = rounded_radius(numbers[number, 1], abs(to[0, i]))
+                    to[rows, i] = round_radius(numbers[number, 1], abs(to[0, i]))
         for s in range(rows + 1):
             for i in range(count):
                 for k in range(outputs.shape[0]):
                     found[s, start + i, k] = m[outputs[k], s, i]
 
 
-def sizes(form: Array, first: int, rows: int, total: Array) -> None:
+def sum_sizes(form: Array, first: int, rows: int, total: Array) -> None:
     """The sum of the sizes of a form's rows from the ``first`` on."""
-    for i in range(LANES):
+    for i in range(TAPE_LANES_COUNT):
         total[i] = 0.0
     for s in range(first, rows):
-        for i in range(LANES):
+        for i in range(TAPE_LANES_COUNT):
             total[i] += abs(form[s, i])
 
 
 @lru_cache(maxsize=1)
-def _compiled_machine() -> Callable[..., None]:
+def _compile_machine() -> Callable[..., None]:
     """The machine, compiled once for all formulas and kept between runs."""
-    return compiled_module(
+    return load_compiled_module(
         _TEXT.format(
             numbers="\n".join(f"{name} = {vars(affine)[name]!r}" for name in _NUMBERS),
-            lanes=LANES,
+            lanes=TAPE_LANES_COUNT,
             codes=", ".join(CODES),
             count=len(CODES),
-            functions="\n\n".join(f"@compiled\n{inspect.getsource(each)}" for each in (*_FUNCTIONS, sizes, machine)),
+            functions="\n\n".join(
+                f"@compiled\n{inspect.getsource(each)}" for each in (*_FUNCTIONS, sum_sizes, run_instructions)
+            ),
         ),
     ).machine

@@ -12,26 +12,26 @@ from itertools import takewhile
 
 import numpy as np
 
-from ..budgets import FAST_DIRECTIONS
+from ..budgets import DIRECTION_RATE_GROWTH_MAX
 from ..closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, PlatformDirection
-from ..errors import NotSampled
-from ..geometry.so3 import between, exponential, quaternions
-from ..geometry.vectors import Array, frozen, hat, inverse
+from ..errors import SamplingFailure
+from ..geometry.so3 import convert_to_quaternions, convert_vectors_to_rotations, find_smallest_rotations
+from ..geometry.vectors import Array, freeze_array, hat, invert_pose
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.pinocchio_model import PinocchioModel, across
+from ..kinematics.pinocchio_model import PinocchioModel, choose_slide_direction
 from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.legs import Leg, LegDecomposition
 from ..mechanism.observations.direction import Direction
-from ..mechanism.screws import elementary
+from ..mechanism.screws import split_elementary
 from ..results import Value
-from ..tolerances import CLOSED
+from ..tolerances import CLOSURE_RESIDUAL_TOL
 from .engine import Batch, Flags
 from .iterative_leg import IterativeLeg
-from .program import CHUNK
+from .program import POSE_CHUNK_COUNT
 
-STEP = 0.15
+WALK_STEP_LENGTH_FRACTION = 0.15
 """Length of a step of a walk (characteristic lengths, radians)."""
-CLOSING = 12
+LEG_GAUSS_NEWTON_STEPS_COUNT = 12
 """Gauss-Newton steps from where the subproblem puts a leg's links."""
 
 
@@ -53,7 +53,7 @@ class ConfigurationBuilder(Value):
         mechanism = decomposition.mechanism
         placed = {mechanism.base, *batch.coordinates.links, *(name for leg in decomposition.legs for name in leg.links)}
         known = all(isinstance(leg, ClosedFormLeg) for leg in batch.legs.values())
-        if not (known and batch.coordinates.constant and placed == set(mechanism.links)) or any(
+        if not (known and batch.coordinates.has_constant_twists and placed == set(mechanism.links)) or any(
             joint.type is JointType.FREE for joint in mechanism.joints.values()
         ):
             return None
@@ -65,12 +65,14 @@ class ConfigurationBuilder(Value):
         """The closed configurations at platform poses X (n, 4, 4), None where there is none in the working mode of the
         zero configuration."""
         found: list[ClosedConfiguration | None] = []
-        for start in range(0, len(X), CHUNK):
-            frames, reached = self.frames(X[start : start + CHUNK])
-            q = frozen(coordinates(self.model, frames))
+        for start in range(0, len(X), POSE_CHUNK_COUNT):
+            frames, reached = self.frames(X[start : start + POSE_CHUNK_COUNT])
+            q = freeze_array(compute_coordinates(self.model, frames))
             for here, there in zip(q, reached, strict=True):
                 residual = float(np.linalg.norm(self.model.residual(here))) if there else np.inf
-                found.append(ClosedConfiguration(self.model, here, residual) if residual <= CLOSED else None)
+                found.append(
+                    ClosedConfiguration(self.model, here, residual) if residual <= CLOSURE_RESIDUAL_TOL else None
+                )
         return found
 
     def random_walk(self, count: int, seed: int = 0, steps: int = 40) -> Iterator[ClosedConfiguration]:
@@ -78,7 +80,7 @@ class ConfigurationBuilder(Value):
         configuration, side by side; a walk ends where the robot cannot reach further, or comes near to a Type 1
         singularity."""
         rng, batch = np.random.default_rng(seed), self.batch
-        limit = FAST_DIRECTIONS * float(batch.evaluate(batch.home[None]).singular_values[0, 0])
+        limit = DIRECTION_RATE_GROWTH_MAX * float(batch.evaluate(batch.home[None]).singular_values[0, 0])
         given = failed = 0
         walks = -(-count // steps)
         while given < count:
@@ -94,7 +96,7 @@ class ConfigurationBuilder(Value):
                     if given == count:
                         return
             if failed > 10 * (given + walks + 10):
-                raise NotSampled(self.model.mechanism.name, given, count, given + failed)
+                raise SamplingFailure(self.model.mechanism.name, given, count, given + failed)
 
     def _walks(self, rng: np.random.Generator, walks: int, steps: int, limit: float) -> list[Array]:
         """The platform poses (k, 4, 4) of each walk."""
@@ -106,10 +108,10 @@ class ConfigurationBuilder(Value):
         for _ in range(steps):
             velocity += rng.normal(size=velocity.shape) / 2
             velocity /= np.linalg.norm(velocity, axis=1, keepdims=True)
-            shift, spin = np.split(STEP * velocity, [coordinates.translations.shape[1]], axis=1)
+            shift, spin = np.split(WALK_STEP_LENGTH_FRACTION * velocity, [coordinates.translations.shape[1]], axis=1)
             p, R = coordinates.place(X)
             X = X.copy()
-            X[:, :3, :3] = exponential(spin @ coordinates.rotations.T) @ R
+            X[:, :3, :3] = convert_vectors_to_rotations(spin @ coordinates.rotations.T) @ R
             X[:, :3, 3] = p + length * (shift @ coordinates.translations.T) - X[:, :3, :3] @ coordinates.point
             found = self.batch.evaluate(X, compiled=False)
             kept = np.flatnonzero(found.reached & ~(found.singular_values[:, 0] > limit))
@@ -133,8 +135,8 @@ class ConfigurationBuilder(Value):
             state[:, :, :3, 3] /= batch.length
             state[~there] = chain.zero
             end = state[:, 1].copy()
-            state, residual = chain.close(state, end, CLOSING)
-            reached &= there & (residual <= CLOSED)
+            state, residual = chain.close(state, end, LEG_GAUSS_NEWTON_STEPS_COUNT)
+            reached &= there & (residual <= CLOSURE_RESIDUAL_TOL)
             state[:, :, :3, 3] *= batch.length
             frames.update({name: state[:, i] for i, name in enumerate(chain.links) if name in leg.links})
         return frames, reached
@@ -152,16 +154,16 @@ class ConfigurationBuilder(Value):
             ends = form.ends(p, R)
         if not isinstance(form, PlatformDirection):
             u = np.where(there[:, None], u, zero)
-        first = _first(form, ends, there)
-        turn = exponential(between(zero, u))
+        first = _place_first_link(form, ends, there)
+        turn = convert_vectors_to_rotations(find_smallest_rotations(zero, u))
         guess = {name: frames[name] for name in (mechanism.base, leg.platform_link)}
-        for name in _outwards(mechanism, leg, form.crank):
+        for name in _order_links(mechanism, leg, form.crank):
             pose = mechanism.links[name].pose
             if name == form.crank:
                 guess[name] = first @ pose
                 continue
-            joint, held = _hold(mechanism, leg, name, guess)
-            moved = guess[held] @ inverse(mechanism.links[held].pose)
+            joint, held = _find_holding_joint(mechanism, leg, name, guess)
+            moved = guess[held] @ invert_pose(mechanism.links[held].pose)
             centre = moved[:, :3, :3] @ joint.point + moved[:, :3, 3]
             guess[name] = np.tile(np.eye(4), (n, 1, 1))
             guess[name][:, :3, :3] = turn @ pose[:3, :3]
@@ -169,7 +171,7 @@ class ConfigurationBuilder(Value):
         return guess, there
 
 
-def _first(form: ClosedFormLeg, B: Array | None, there: Flags) -> Array:
+def _place_first_link(form: ClosedFormLeg, B: Array | None, there: Flags) -> Array:
     """The displacement (n, 4, 4) that brings the point of the leg's first link to B."""
     X = np.tile(np.eye(4), (len(there), 1, 1))
     if isinstance(form, OnRail) and B is not None:
@@ -177,13 +179,13 @@ def _first(form: ClosedFormLeg, B: Array | None, there: Flags) -> Array:
     elif isinstance(form, OnCrank | PlatformDirection) and B is not None:
         a, start, arm = form.pivot, form.place - form.centre, B - form.centre
         angle = np.arctan2(arm @ np.cross(a, start), arm @ start)
-        X[:, :3, :3] = exponential(angle[:, None] * a)
+        X[:, :3, :3] = convert_vectors_to_rotations(angle[:, None] * a)
         X[:, :3, 3] = form.centre - X[:, :3, :3] @ form.centre
     X[~there] = np.eye(4)
     return X
 
 
-def _outwards(mechanism: Mechanism, leg: Leg, crank: str) -> list[str]:
+def _order_links(mechanism: Mechanism, leg: Leg, crank: str) -> list[str]:
     """The leg's links, each after one that it hangs on."""
     order: list[str] = [crank] if crank in leg.links else []
     rest = [name for name in leg.links if name not in order]
@@ -195,16 +197,16 @@ def _outwards(mechanism: Mechanism, leg: Leg, crank: str) -> list[str]:
     return order
 
 
-def _hold(mechanism: Mechanism, leg: Leg, name: str, placed: Mapping[str, Array]) -> tuple[Joint, str]:
+def _find_holding_joint(mechanism: Mechanism, leg: Leg, name: str, placed: Mapping[str, Array]) -> tuple[Joint, str]:
     """The joint by which a link is placed, and the link beyond it: the platform's before others, turning ones first."""
     joints = [joint for joint in mechanism.joints_of(name) if joint.other(name) in placed]
-    best = min(joints, key=lambda joint: (joint.type.slides, joint.other(name) != leg.platform_link))
+    best = min(joints, key=lambda joint: (joint.type.has_translation, joint.other(name) != leg.platform_link))
     return best, best.other(name)
 
 
-def coordinates(model: PinocchioModel, frames: Mapping[str, Array]) -> Array:
+def compute_coordinates(model: PinocchioModel, frames: Mapping[str, Array]) -> Array:
     """Return the model's q (n, nq) for poses of all links (n, 4, 4), metres."""
-    moved = _displacements(model, frames)
+    moved = _compute_displacements(model, frames)
     n = len(next(iter(frames.values())))
     q = np.repeat(model.q0[None], n, axis=0)
     for joint, parent, names in model.parts():
@@ -213,17 +215,17 @@ def coordinates(model: PinocchioModel, frames: Mapping[str, Array]) -> Array:
         R = A[:, :3, :3].transpose(0, 2, 1) @ B[:, :3, :3]
         centre = B[:, :3, :3] @ joint.point + B[:, :3, 3] - A[:, :3, 3]
         shift = np.einsum("nji,nj->ni", A[:, :3, :3], centre) - joint.point
-        values = _coordinates(turned, R, shift / model.length)
+        values = _read_coordinates(turned, R, shift / model.length)
         for start, value in zip((model.start(name) for name in names), values, strict=True):
             q[:, start : start + value.shape[1]] = value
     return q
 
 
-def rates(model: PinocchioModel, frames: Mapping[str, Array], link: str) -> tuple[Array, Array]:
+def compute_rates(model: PinocchioModel, frames: Mapping[str, Array], link: str) -> tuple[Array, Array]:
     """Return the effect of the model's velocities at closed poses of all links (n, 4, 4), metres: the rates of the
     closure residuals (n, rows, nv), and the twists (n, 6, nv) of a link at the base's origin; characteristic lengths
     and radians."""
-    moved, (tree, cuts) = _displacements(model, frames), model.spanned
+    moved, (tree, cuts) = _compute_displacements(model, frames), model.spanned
     screws, rows = np.zeros((len(moved[link]), 6, model.nv)), [np.zeros((len(moved[link]), 0, model.nv))]
     moves = {model.mechanism.base: np.zeros(model.nv)}
 
@@ -233,7 +235,7 @@ def rates(model: PinocchioModel, frames: Mapping[str, Array], link: str) -> tupl
         if places:
             own = joint if joint.predecessor == parent else joint.turned()
             found[places] = 1.0
-            screws[:, :, places[0] : places[-1] + 1] = _screws(
+            screws[:, :, places[0] : places[-1] + 1] = _compute_screws(
                 own, moved[parent], moved[joint.other(parent)], model.length
             )
         return found
@@ -245,15 +247,15 @@ def rates(model: PinocchioModel, frames: Mapping[str, Array], link: str) -> tupl
     for joint, signs in zip(cuts, ends, strict=True):
         gap = screws * signs
         if joint.type is JointType.SPHERICAL:
-            gap = gap[:, :3] - hat(_centre(joint, moved[joint.predecessor]) / model.length) @ gap[:, 3:]
+            gap = gap[:, :3] - hat(_locate_centre(joint, moved[joint.predecessor]) / model.length) @ gap[:, 3:]
         rows.append(gap)
     return np.concatenate(rows, axis=1), screws * moves[link]
 
 
-def _screws(joint: Joint, A: Array, B: Array, length: float) -> Array:
+def _compute_screws(joint: Joint, A: Array, B: Array, length: float) -> Array:
     """The twists (n, 6, k) at the base's origin for unit velocities of a joint's coordinates, A and B (n, 4, 4) what
     brought its links from the zero configuration."""
-    R, found = A[:, :3, :3], elementary(joint.type, joint.axes, across)
+    R, found = A[:, :3, :3], split_elementary(joint.type, joint.axes, choose_slide_direction)
     slides, turns = (
         np.array([axis for kind, axis in found if kind is each]).reshape(-1, 3)
         for each in (JointType.PRISMATIC, JointType.REVOLUTE)
@@ -261,23 +263,23 @@ def _screws(joint: Joint, A: Array, B: Array, length: float) -> Array:
     turned = R @ turns.T
     if joint.type is JointType.UNIVERSAL:
         turned[:, :, 1] = B[:, :3, :3] @ turns[1]
-    arms = hat(_centre(joint, A) / length) @ turned
+    arms = hat(_locate_centre(joint, A) / length) @ turned
     slid = R @ slides.T
     return np.concatenate(
         [np.concatenate([slid, np.zeros_like(slid)], axis=1), np.concatenate([arms, turned], axis=1)], axis=2
     )
 
 
-def _centre(joint: Joint, A: Array) -> Array:
+def _locate_centre(joint: Joint, A: Array) -> Array:
     return np.asarray(A[:, :3, :3] @ joint.point + A[:, :3, 3])
 
 
-def _displacements(model: PinocchioModel, frames: Mapping[str, Array]) -> dict[str, Array]:
+def _compute_displacements(model: PinocchioModel, frames: Mapping[str, Array]) -> dict[str, Array]:
     """Return the displacements of the links from the zero configuration to poses (n, 4, 4)."""
-    return {name: X @ inverse(model.mechanism.links[name].pose) for name, X in frames.items()}
+    return {name: X @ invert_pose(model.mechanism.links[name].pose) for name, X in frames.items()}
 
 
-def _coordinates(joint: Joint, R: Array, shift: Array) -> list[Array]:
+def _read_coordinates(joint: Joint, R: Array, shift: Array) -> list[Array]:
     """Return the coordinates of each of a joint's parts, (n, 1) or (n, 4), in the order of the model's."""
     match joint.type:
         case JointType.UNIVERSAL:
@@ -285,18 +287,18 @@ def _coordinates(joint: Joint, R: Array, shift: Array) -> list[Array]:
             normal = np.cross(first, second)
             carried = R @ second
             one = np.arctan2(carried @ normal, carried @ np.cross(normal, first))[:, None]
-            rest = exponential(-one * first) @ R
-            return [one, _angle(rest, second)]
+            rest = convert_vectors_to_rotations(-one * first) @ R
+            return [one, _measure_angle(rest, second)]
         case JointType.SPHERICAL:
-            return [quaternions(R)[:, [1, 2, 3, 0]]]
+            return [convert_to_quaternions(R)[:, [1, 2, 3, 0]]]
         case _:
             return [
-                shift @ axis[:, None] if kind is JointType.PRISMATIC else _angle(R, axis)
-                for kind, axis in elementary(joint.type, joint.axes, across)
+                shift @ axis[:, None] if kind is JointType.PRISMATIC else _measure_angle(R, axis)
+                for kind, axis in split_elementary(joint.type, joint.axes, choose_slide_direction)
             ]
 
 
-def _angle(R: Array, axis: Array) -> Array:
+def _measure_angle(R: Array, axis: Array) -> Array:
     """The angle (n, 1) of rotations about an axis."""
     sine = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], 1) @ axis
     return np.arctan2(sine, 0.5 * (np.trace(R, axis1=1, axis2=2) - 1))[:, None]

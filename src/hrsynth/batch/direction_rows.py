@@ -16,7 +16,7 @@ from ..closed_forms.legs import ClosedFormLeg, FixedDirection, Number, OnCrank, 
 from ..geometry.components import Components, cross, dot, minus, plus, scale, sqrt, transform_vector
 
 
-def direction_rows(
+def compute_direction_rows(
     leg: ClosedFormLeg, p: Components, R: Components, twists: Components, number: Number
 ) -> tuple[Any, Components, list[Any]]:
     """Reach margin, u and the rows of Mᵀ (3, d) for twists (6, d) of the platform's point, m and rad."""
@@ -30,7 +30,7 @@ def direction_rows(
     if isinstance(leg, PlatformDirection):
         u: Components = transform_vector(R, number(leg.axis))
         margin = seen.at(D, number, leg.mode, *u)[0] if leg.radius else 1.0
-        return margin, u, _by_rows([cross(w, u) for _, w in columns])
+        return margin, u, _order_by_rows([cross(w, u) for _, w in columns])
     margin, carried = seen.at(D, number, leg.mode)
     if isinstance(leg, OnRod):
         gain = leg.sense / number(leg.rod)
@@ -44,9 +44,11 @@ def direction_rows(
     return (
         margin,
         u,
-        _by_rows([minus(scale(gain, y), scale(dot(u, y), slip)) for y in (plus(v, cross(w, arm)) for v, w in columns)]),
+        _order_by_rows(
+            [minus(scale(gain, y), scale(dot(u, y), slip)) for y in (plus(v, cross(w, arm)) for v, w in columns)]
+        ),
     )
 
 
-def _by_rows(columns: list[list[Any]]) -> list[Any]:
+def _order_by_rows(columns: list[list[Any]]) -> list[Any]:
     return [column[i] for i in range(3) for column in columns]

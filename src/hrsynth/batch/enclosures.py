@@ -14,12 +14,14 @@ import numpy as np
 
 from ..geometry.affine import AffineForms, stack
 from ..results import Value
-from ..tolerances import CHAIN_ROUNDING, FOLLOWED
-from .box_machine import MachineCode, Term, worth
+from ..tolerances import CHAIN_ROUNDING, HIDDEN_ROBOT_RESIDUAL_TOL
+from .box_machine import MachineCode, Term, is_numba_worthwhile
 from .tape import Symbol, Tape
 
 
-def trace_formula(formula: Callable[..., Sequence[Any]], inputs: int, off: float = FOLLOWED) -> BoxFormula:
+def trace_formula(
+    formula: Callable[..., Sequence[Any]], inputs: int, off: float = HIDDEN_ROBOT_RESIDUAL_TOL
+) -> BoxFormula:
     """A formula from ``inputs`` numbers and from what makes components of the robot's numbers, each of which may be
     ``off`` by so much, as code for boxes."""
     tape = Tape([])
@@ -42,7 +44,7 @@ class BoxFormula(Value):
     outputs: Sequence[int | Term]
 
     @classmethod
-    def of(cls, tape: Tape, outputs: Sequence[Any], off: float = FOLLOWED) -> BoxFormula:
+    def of(cls, tape: Tape, outputs: Sequence[Any], off: float = HIDDEN_ROBOT_RESIDUAL_TOL) -> BoxFormula:
         """The code of some of a tape's symbols; the robot's numbers may be ``off`` by so much."""
         from flint import arb
 
@@ -53,15 +55,15 @@ class BoxFormula(Value):
 
         def term(each: Any) -> int | Term:
             if isinstance(each, int):
-                return _term(known[each]) if fixed[each] else each
-            return _term(arb(each))
+                return _convert_to_term(known[each]) if fixed[each] else each
+            return _convert_to_term(arb(each))
 
         for i in sorted(used):
             name, *arguments = tape.code[i]
             if name == "number":
                 known[i] = arb(tape.numbers[arguments[0]], off)
             elif fixed[i]:
-                known[i] = _ball(name, [known[a] if isinstance(a, int) else arb(a) for a in arguments])
+                known[i] = _apply_to_balls(name, [known[a] if isinstance(a, int) else arb(a) for a in arguments])
             else:
                 steps.append((i, name, arguments if name == "load" else [term(a) for a in arguments]))
         given = [term(each.number if isinstance(each, Symbol) else float(each)) for each in outputs]
@@ -86,11 +88,15 @@ class BoxFormula(Value):
 
     def together(self, inputs: Sequence[AffineForms]) -> AffineForms:
         """Return the outputs (boxes, outputs) for inputs of shape (boxes,); NaN where a formula has a pole in a box."""
-        return self.machine.run(inputs) if worth(len(self.steps), len(inputs[0].r)) else stack(self._rows(inputs))
+        return (
+            self.machine.run(inputs)
+            if is_numba_worthwhile(len(self.steps), len(inputs[0].r))
+            else stack(self._rows(inputs))
+        )
 
     def at(self, inputs: Sequence[AffineForms]) -> list[AffineForms]:
         """Return the outputs one after the other."""
-        if not worth(len(self.steps), len(inputs[0].r)):
+        if not is_numba_worthwhile(len(self.steps), len(inputs[0].r)):
             return self._rows(inputs)
         found = self.machine.run(inputs)
         return [found[..., k] for k in range(len(self.outputs))]
@@ -110,14 +116,14 @@ class BoxFormula(Value):
                         pairs[of] = found[of].sines()
                     found[i] = pairs[of][name == "cos"]
                 else:
-                    found[i] = _forms(name, [found[a] if isinstance(a, int) else a for a in arguments])
+                    found[i] = _apply_to_forms(name, [found[a] if isinstance(a, int) else a for a in arguments])
                 for each in done:
                     del found[each]
         nothing = inputs[0].scaled(0.0, 0.0)
         return [found[each] if isinstance(each, int) else nothing.shifted(*each) for each in self.outputs]
 
 
-def _term(ball: Any) -> Term:
+def _convert_to_term(ball: Any) -> Term:
     """A ball as a float and how far it may be off."""
     if not ball.is_finite():
         return np.nan, np.inf
@@ -125,7 +131,7 @@ def _term(ball: Any) -> Term:
     return middle, float(np.nextafter(float((ball - middle).abs_upper()), np.inf)) if not ball.is_exact() else 0.0
 
 
-def _ball(name: str, a: Sequence[Any]) -> Any:
+def _apply_to_balls(name: str, a: Sequence[Any]) -> Any:
     """An operation on balls."""
     match name:
         case "+":
@@ -141,7 +147,7 @@ def _ball(name: str, a: Sequence[Any]) -> Any:
     raise ValueError(name)
 
 
-def _forms(name: str, a: Sequence[AffineForms | Term]) -> AffineForms:
+def _apply_to_forms(name: str, a: Sequence[AffineForms | Term]) -> AffineForms:
     """An operation on forms, or on a form and a number."""
     one, other = a[0], a[-1]
     if isinstance(one, AffineForms) and isinstance(other, AffineForms):

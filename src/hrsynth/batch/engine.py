@@ -14,24 +14,24 @@ from importlib.util import find_spec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..budgets import LARGEST_BATCH, POSES_FOR_COMPILING, POSES_FOR_NUMBA
+from ..budgets import LARGEST_BATCH, NUMBA_COMPILE_POSES_MIN, NUMBA_POSES_MIN
 from ..closed_forms.legs import ClosedFormLeg
 from ..errors import BadRequest, MissingExtra
-from ..geometry.components import Components, cross, plus, scale, tangents, transform_vector, where
-from ..geometry.vectors import Array, frozen
+from ..geometry.components import Components, build_tangents, cross, plus, scale, transform_vector, where
+from ..geometry.vectors import Array, freeze_array
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import PlatformMotion
 from ..mechanism.legs import LegDecomposition
 from ..mechanism.observation import Observation
 from ..mechanism.observations.direction import Direction
 from ..results import Value
-from ..tolerances import RANK_CUTOFF
-from .direction_rows import direction_rows
-from .error_bounds import ErrorBound, bounds_compiled, bounds_of
+from ..tolerances import RANK_CUTOFF_FRACTION
+from .direction_rows import compute_direction_rows
+from .error_bounds import ErrorBound, bound_errors, is_bound_compiled
 from .iterative_leg import IterativeLeg, IterativeLegStates
-from .leg_wrenches import LegForce, freedoms, holds_of_leg
-from .platform_coordinates import PlatformCoordinates, SlidingLink, frames_at, sliding_links
-from .program import CHUNK, Compiled, Program
+from .leg_wrenches import LegForce, compute_free_twists, list_leg_forces
+from .platform_coordinates import PlatformCoordinates, SlidingLink, collect_frames, find_sliding_links
+from .program import POSE_CHUNK_COUNT, Compiled, Program
 from .recognition import recognise_leg
 
 Flags = NDArray[np.bool_]
@@ -73,7 +73,7 @@ class Evaluation(Value):
         u, M = self.directions, self.interaction_matrix.reshape(len(self.reached), len(self.normals), 3, -1)
         rows = []
         for i, normal in enumerate(self.normals):
-            bases = [np.cross(normal, u[:, i]).T] if normal is not None else tangents(u[:, i].T)
+            bases = [np.cross(normal, u[:, i]).T] if normal is not None else build_tangents(u[:, i].T)
             rows += [np.einsum("rn,nrd->nd", np.array(basis), M[:, i]) for basis in bases]
         square = np.stack(rows, axis=1)
         return np.linalg.det(square) if square.shape[1] == square.shape[2] else None
@@ -122,7 +122,7 @@ class Batch(Value):
             or set(seen) != set(decomposition.labels)
         ):
             return None
-        frames = frames_at(configurations)
+        frames = collect_frames(configurations)
         names = tuple(dict.fromkeys((*decomposition.platform, mechanism.platform)))
         coordinates = PlatformCoordinates.of(motion, frames, names, mechanism.length)
         legs: dict[str, ClosedFormLeg | IterativeLeg | None] = {}
@@ -130,16 +130,16 @@ class Batch(Value):
         for leg in decomposition.legs:
             found = recognise_leg(decomposition, leg, seen[leg.label], coordinates, frames)
             placed = decomposition.point is not None or leg.platform_link in coordinates.links
-            if placed and (found is None or not coordinates.constant):
+            if placed and (found is None or not coordinates.has_constant_twists):
                 iterative[leg.label] = IterativeLeg.of(mechanism, leg, seen[leg.label], decomposition.point)
             legs[leg.label] = found or iterative.get(leg.label)
-        holds = _holds(decomposition, coordinates, iterative, frames)
+        holds = _list_leg_forces(decomposition, coordinates, iterative, frames)
         if holds:
             iterative = {label: leg for label, leg in iterative.items() if legs[label] is leg}
-        normals = {o.leg: _axis_of(frames[o.link][:, :3, :3] @ o.direction) for o in seen.values()}
+        normals = {o.leg: _find_rotation_axis(frames[o.link][:, :3, :3] @ o.direction) for o in seen.values()}
         sliding: dict[str, tuple[SlidingLink, ClosedFormLeg]] = {}
-        if coordinates.constant and not iterative:
-            slid = sliding_links(coordinates, frames, names, mechanism)
+        if coordinates.has_constant_twists and not iterative:
+            slid = find_sliding_links(coordinates, frames, names, mechanism)
             for leg in decomposition.legs:
                 if legs[leg.label] is None and leg.platform_link in slid:
                     link, far = slid[leg.platform_link]
@@ -148,7 +148,7 @@ class Batch(Value):
                     form = recognise_leg(decomposition, leg, seen[leg.label], placed_so, there)
                     if form is not None:
                         sliding[leg.label] = link, form
-        return cls(coordinates, frozen(motion.home), legs, iterative, holds, normals, mechanism.length, sliding)
+        return cls(coordinates, freeze_array(motion.home), legs, iterative, holds, normals, mechanism.length, sliding)
 
     @property
     def slides(self) -> tuple[str, ...]:
@@ -156,14 +156,14 @@ class Batch(Value):
         return tuple(dict.fromkeys(link.joint for link, _ in self.sliding.values()))
 
     @property
-    def complete(self) -> bool:
+    def is_complete(self) -> bool:
         """Return True if every leg is compiled: then ``reached`` holds for the whole robot."""
         return all(leg is not None for leg in self.legs.values())
 
     @property
-    def closed(self) -> bool:
+    def is_closed_form(self) -> bool:
         """Return True if one program of closed forms gives everything."""
-        return self.coordinates.constant and not self.iterative
+        return self.coordinates.has_constant_twists and not self.iterative
 
     def evaluate(
         self,
@@ -186,8 +186,8 @@ class Batch(Value):
         cones
             Half-angles of their cones (rad; one, or one per leg).
         slides
-            Coordinates (n, m) of the P joints :attr:`slides` (m), by which links slide on the platform: then the legs
-            on these can be observed as well, and Mᵀ has one more column for each.
+            Coordinates (n, m) of the P joints :attr:`has_translation` (m), by which links slide on the platform: then
+            the legs on these can be observed as well, and Mᵀ has one more column for each.
         compiled
             True for numba, False for NumPy, "jax" for jax (default: numba if its kernels are compiled and worth
             starting).
@@ -209,7 +209,7 @@ class Batch(Value):
         s = self._slid(slides, len(X))
         slid = s is not None
         watched = self._watched(legs, slid)
-        half = None if cones is None else _half_angles(cones, len(watched))
+        half = None if cones is None else _expand_half_angles(cones, len(watched))
         twists = self._twists(slid)
         need = 8 * len(X) * (3 * len(watched) * (self.coordinates.dof + slid * len(self.slides) + 1) + 5)
         if need > LARGEST_BATCH:
@@ -220,16 +220,16 @@ class Batch(Value):
                 remedy="Evaluate the poses in parts with sweep.",
             )
         k, n = len(watched), len(X)
-        quick = self.uses_numba(n, watched, half, slid=slid) if compiled is None else compiled
+        quick = self.may_use_numba(n, watched, half, slid=slid) if compiled is None else compiled
         if compiled:
             self._require_compilable("jax" if compiled == "jax" else "numba")
         given = X if s is None else np.hstack([X[:, :3].reshape(n, 12), s])
         rows = self._program(watched, slid).run(given, ROWS, compiled=quick)
         reached, u = rows[0] > 0, rows[1 : 1 + 3 * k].reshape(k, 3, n)
         M = rows[1 + 3 * k :].reshape(3 * k, twists.shape[1], n)
-        if not self.closed:
+        if not self.is_closed_form:
             M, twists = self._iterate(X, watched, reached, u, M)
-        position, orientation = (None, None) if half is None else bounds_of(M, twists, half, reached, compiled=quick)
+        position, orientation = (None, None) if half is None else bound_errors(M, twists, half, reached, compiled=quick)
         if not reached.all():
             u[..., ~reached], M[..., ~reached] = np.nan, np.nan
         return Evaluation(
@@ -294,25 +294,25 @@ class Batch(Value):
     @cached_property
     def span(self) -> Array:
         """The coordinates' twists (m, rad), (6, D)."""
-        return _span(self.coordinates, self.length)
+        return _compute_span(self.coordinates, self.length)
 
-    def uses_numba(
-        self, n: int, legs: Sequence[str], cones: Array | None, enough: int = POSES_FOR_NUMBA, *, slid: bool = False
+    def may_use_numba(
+        self, n: int, legs: Sequence[str], cones: Array | None, enough: int = NUMBA_POSES_MIN, *, slid: bool = False
     ) -> bool:
         """Return True if numba computes n poses by default: its kernels are compiled and the poses are ``enough``, or
         they are so many that compiling pays."""
-        if not self.closed or n < enough or find_spec("numba") is None:
+        if not self.is_closed_form or n < enough or find_spec("numba") is None:
             return False
-        return n >= POSES_FOR_COMPILING or (
+        return n >= NUMBA_COMPILE_POSES_MIN or (
             self._program(legs, slid).is_compiled(ROWS)
-            and (cones is None or bounds_compiled(len(legs), self._twists(slid), cones))
+            and (cones is None or is_bound_compiled(len(legs), self._twists(slid), cones))
         )
 
     def _require_compilable(self, by: str) -> None:
         """Raise ``MissingExtra`` where a package is not there, ``BadRequest`` where this batch is not for it."""
         if find_spec(by) is None:
             raise MissingExtra(f"compiled={by!r}", EXTRAS[by])
-        if not self.closed:
+        if not self.is_closed_form:
             raise BadRequest(
                 "a batch with iterated legs, or with platform twists that change with the pose, is not compiled",
                 remedy="Use compiled=False.",
@@ -354,7 +354,7 @@ class Batch(Value):
                         moves[i][j] = moves[i][j] + each
                 for i, each in enumerate(scale(program.number(self.length), way)):
                     moves[i][d - len(slides) + slides.index(link.joint)] = each
-            margin, u, M = direction_rows(leg, p, R, [each for row in moves for each in row], program.number)
+            margin, u, M = compute_direction_rows(leg, p, R, [each for row in moves for each in row], program.number)
             found: dict[str, Components] = {f"margin_{name}": [margin]}
             return found | ({f"u_{name}": u, f"M_{name}": M} if name in watched else {})
 
@@ -384,11 +384,11 @@ class Batch(Value):
     def _iterate(self, X: Array, watched: Sequence[str], reached: Flags, u: Array, M: Array) -> tuple[Array, Array]:
         """Fill in the rows of legs that are solved by iteration, and ``reached``; Mᵀ (3 k, d, n) and its twists, which
         the legs decide where they are not the same at all poses."""
-        n, constant = len(X), self.coordinates.constant
+        n, constant = len(X), self.coordinates.has_constant_twists
         basis = np.empty((n, self.span.shape[1], self.coordinates.dof))
         X = np.where(reached[:, None, None], X, self.home)
-        for start in range(0, n, CHUNK):
-            here = slice(start, start + CHUNK)
+        for start in range(0, n, POSE_CHUNK_COUNT):
+            here = slice(start, start + POSE_CHUNK_COUNT)
             states = {name: self._follow(leg, X[here]) for name, leg in self.iterative.items()}
             for name in states:
                 if self.legs[name] is self.iterative[name]:
@@ -417,8 +417,8 @@ class Batch(Value):
         """An orthonormal basis (D, d, n) of the coordinates of the twists that the legs' forces allow, and where these
         are independent."""
         p, R = self.coordinates.place(X)
-        basis, least = freedoms(np.array([hold.rows(p, R, self.span) for hold in self.holds]))
-        return basis, least > RANK_CUTOFF
+        basis, least = compute_free_twists(np.array([hold.rows(p, R, self.span) for hold in self.holds]))
+        return basis, least > RANK_CUTOFF_FRACTION
 
     def _follow(self, leg: IterativeLeg, X: Array) -> IterativeLegStates:
         return leg.follow_from_zero(self.coordinates, self.home, X, self.span)
@@ -429,9 +429,9 @@ class Batch(Value):
         rows = np.concatenate([each.wrenches() for each in states], axis=1)
         _, s, right = np.linalg.svd(rows, full_matrices=False)
         kept = rows.shape[2] - self.coordinates.dof
-        clear = s[:, kept - 1] > RANK_CUTOFF
+        clear = s[:, kept - 1] > RANK_CUTOFF_FRACTION
         if kept < s.shape[1]:
-            clear &= s[:, kept] <= RANK_CUTOFF
+            clear &= s[:, kept] <= RANK_CUTOFF_FRACTION
         basis = right[:, kept:].transpose(0, 2, 1)
         turned = np.linalg.det(right[:, kept:] @ self._reference) < 0
         basis[turned, :, -1] *= -1
@@ -445,11 +445,11 @@ class Batch(Value):
         return np.linalg.svd(rows)[2][rows.shape[1] - self.coordinates.dof :].T
 
 
-def _span(coordinates: PlatformCoordinates, length: float) -> Array:
+def _compute_span(coordinates: PlatformCoordinates, length: float) -> Array:
     return coordinates.twists * np.repeat([length, 1.0], 3)[:, None]
 
 
-def _holds(
+def _list_leg_forces(
     decomposition: LegDecomposition,
     coordinates: PlatformCoordinates,
     legs: Mapping[str, IterativeLeg],
@@ -457,9 +457,9 @@ def _holds(
 ) -> tuple[LegForce, ...]:
     """Return the legs' wrenches on the platform, if they are known in closed form and determine its twists; else
     nothing."""
-    if coordinates.constant or decomposition.point is not None or set(legs) != set(decomposition.labels):
+    if coordinates.has_constant_twists or decomposition.point is not None or set(legs) != set(decomposition.labels):
         return ()
-    span = _span(coordinates, decomposition.mechanism.length)
+    span = _compute_span(coordinates, decomposition.mechanism.length)
     p, R = coordinates.place(frames[decomposition.mechanism.platform])
     found: list[LegForce] = []
     for leg in decomposition.legs:
@@ -467,14 +467,14 @@ def _holds(
         state = np.stack([frames[link] for link in chain.links], axis=1)
         state[:, :, :3, 3] /= chain.length
         states = IterativeLegStates(chain, coordinates, state, np.zeros(len(state)), R, span)
-        holds = holds_of_leg(decomposition.mechanism, leg, coordinates, states, p)
+        holds = list_leg_forces(decomposition.mechanism, leg, coordinates, states, p)
         if holds is None:
             return ()
         found += holds
     return tuple(found) if len(found) == span.shape[1] - coordinates.dof else ()
 
 
-def _half_angles(cones: ArrayLike, k: int) -> Array:
+def _expand_half_angles(cones: ArrayLike, k: int) -> Array:
     """Half-angles (k,) of the cones of k legs (rad)."""
     half = np.asarray(cones, dtype=float)
     if half.shape not in ((), (k,)):
@@ -485,7 +485,7 @@ def _half_angles(cones: ArrayLike, k: int) -> Array:
     return np.broadcast_to(half, (k,))
 
 
-def _axis_of(u: Array) -> Array | None:
+def _find_rotation_axis(u: Array) -> Array | None:
     """The axis about which directions (m, 3) turn, where they keep their angle to it (a plane or a cone)."""
     _, s, right = np.linalg.svd(u - u[0])
-    return right[2] if s[1] > RANK_CUTOFF > s[2] else None
+    return right[2] if s[1] > RANK_CUTOFF_FRACTION > s[2] else None

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from ..geometry.components import Components, dot, sqrt, where
 from ..geometry.vectors import Array
-from ..tolerances import RANK_CUTOFF
-from .cones import error_along, largest_eigenvalue, positive, root_of, trace_two
+from ..tolerances import RANK_CUTOFF_FRACTION
+from .cones import clear_zero, compute_error_along, compute_root, find_largest_eigenvalue, trace_two
 from .program import Compiled, Formula, Program
 from .three_cones import trace_three
 
@@ -31,7 +31,7 @@ class ErrorBound:
     lower: Array
 
 
-def bounds_of(
+def bound_errors(
     M: Array, twists: Array, cones: Array, reached: NDArray[np.bool_] | None = None, *, compiled: Compiled = False
 ) -> tuple[ErrorBound, ErrorBound]:
     """Position and orientation error for Mᵀ (3 k, d, n) on ``twists`` (6, d) or (n, 6, d), and half-angles of k cones
@@ -39,10 +39,10 @@ def bounds_of(
     rows, d, n = M.shape
     there = np.ones(n, dtype=bool) if reached is None else reached
     if twists.ndim == 2 and n > 1:
-        program = _constant_program(rows // 3, d, twists.tobytes(), cones.tobytes())
+        program = _build_constant_program(rows // 3, d, twists.tobytes(), cones.tobytes())
         given = np.vstack([M.reshape(rows * d, n), there])
     else:
-        program = _program(rows // 3, d)
+        program = _build_program(rows // 3, d)
         turns = np.broadcast_to(twists.reshape(-1, 6 * d), (n, 6 * d)).T
         given = np.vstack([M.reshape(rows * d, n), there, turns, np.broadcast_to(cones[:, None], (len(cones), n))])
     found = program.run(given.T, OUTPUTS, compiled=compiled)
@@ -50,12 +50,12 @@ def bounds_of(
     lost = np.flatnonzero(there & ~(found[4] > 0))
     if len(lost):
         here = twists if twists.ndim == 2 else twists[lost]
-        found[:4, lost] = _deficient(M[..., lost].transpose(2, 0, 1), here, cones)
+        found[:4, lost] = _bound_deficient(M[..., lost].transpose(2, 0, 1), here, cones)
     return ErrorBound(found[0], found[1]), ErrorBound(found[2], found[3])
 
 
 @lru_cache(maxsize=64)
-def _program(k: int, d: int) -> Program:
+def _build_program(k: int, d: int) -> Program:
     """The bounds where twists are other ones at each pose."""
     program = Program.of(M=3 * k * d, reached=1, twists=6 * d, cones=k)
     trace_bounds(program, d, lambda T, cones: (T, cones), "twists", "cones")
@@ -63,7 +63,7 @@ def _program(k: int, d: int) -> Program:
 
 
 @lru_cache(maxsize=64)
-def _constant_program(k: int, d: int, twists: bytes, cones: bytes) -> Program:
+def _build_constant_program(k: int, d: int, twists: bytes, cones: bytes) -> Program:
     """The bounds where twists and cones are the same at all poses."""
     T, half = np.frombuffer(twists), np.frombuffer(cones)
     program = Program.of(M=3 * k * d, reached=1)
@@ -71,17 +71,17 @@ def _constant_program(k: int, d: int, twists: bytes, cones: bytes) -> Program:
         program,
         d,
         lambda: (program.number(T), program.number(half)),
-        single=[freedom(part) for part in T.reshape(2, 3, d)],
+        single=[find_error_direction(part) for part in T.reshape(2, 3, d)],
     )
     return program
 
 
-def bounds_compiled(k: int, twists: Array, cones: Array) -> bool:
+def is_bound_compiled(k: int, twists: Array, cones: Array) -> bool:
     """Return True if numba has compiled them already."""
-    return _constant_program(k, twists.shape[1], twists.tobytes(), cones.tobytes()).is_compiled(OUTPUTS)
+    return _build_constant_program(k, twists.shape[1], twists.tobytes(), cones.tobytes()).is_compiled(OUTPUTS)
 
 
-def freedom(rows: Array) -> Array | None:
+def find_error_direction(rows: Array) -> Array | None:
     """The one direction in which the error lies, where the twists (3, d), the same at all poses, leave no other; zero
     where they leave none."""
     if rows.ndim > 2:
@@ -89,7 +89,7 @@ def freedom(rows: Array) -> Array | None:
     left, values, _ = np.linalg.svd(rows)
     if values[0] == 0:
         return np.zeros(3)
-    return None if len(values) > 1 and values[1] > RANK_CUTOFF * values[0] else left[:, 0]
+    return None if len(values) > 1 and values[1] > RANK_CUTOFF_FRACTION * values[0] else left[:, 0]
 
 
 def trace_bounds(
@@ -107,13 +107,13 @@ def trace_bounds(
         Q = [list(M[j::d]) for j in range(d)]
         R: list[list[Any]] = [[0.0] * d for _ in range(d)]
         for j in range(d):
-            R[j][j] = sqrt(_product(Q[j], Q[j]))
-            Q[j] = [x / positive(R[j][j]) for x in Q[j]]
+            R[j][j] = sqrt(_sum_products(Q[j], Q[j]))
+            Q[j] = [x / clear_zero(R[j][j]) for x in Q[j]]
             for i in range(j + 1, d):
-                R[j][i] = _product(Q[j], Q[i])
+                R[j][i] = _sum_products(Q[j], Q[i])
                 Q[i] = [x - R[j][i] * y for x, y in zip(Q[i], Q[j], strict=True)]
         entries = [entry for row in R for entry in row]
-        least, clear = RANK_CUTOFF * sqrt(_product(entries, entries)), reached[0]
+        least, clear = RANK_CUTOFF_FRACTION * sqrt(_sum_products(entries, entries)), reached[0]
         for j in range(d):
             clear = where(R[j][j] > least, clear, 0.0)
         return {"Q": [x for column in Q for x in column], "R": entries, "clear": [clear]}
@@ -127,10 +127,10 @@ def trace_bounds(
             if only is not None:
                 rows = [[dot(program.number(only), column) for column in zip(*rows, strict=True)]]
             size = len(Q) // d
-            J = [[_product(P, Q[i::size]) for i in range(size)] for P in (_solve_row(row, R) for row in rows)]
+            J = [[_sum_products(P, Q[i::size]) for i in range(size)] for P in (_solve_row(row, R) for row in rows)]
             blocks = [[row[i : i + 3] for row in J] for i in range(0, size, 3)]
             if only is not None:
-                total = _product(cones, [sqrt(dot(block[0], block[0])) for block in blocks])
+                total = _sum_products(cones, [sqrt(dot(block[0], block[0])) for block in blocks])
                 return {PARTS[part]: [total, total]}
             return {
                 f"{PARTS[part]}_{i}": [cone * cone * dot(block[a], block[b]) for a, b in ENTRIES]
@@ -154,14 +154,14 @@ def trace_maximum(program: Program, forms: list[str], go: str, name: str) -> Non
     """Add the largest error at poses where the flag ``go`` is positive, for the forms B_i of these names: ``name`` is
     an upper bound and a lower one, the same for one cone and two."""
     if len(forms) == 1:
-        program.apply(lambda B: {name: 2 * [root_of(largest_eigenvalue(B)[0])]}, forms[0])
+        program.apply(lambda B: {name: 2 * [compute_root(find_largest_eigenvalue(B)[0])]}, forms[0])
     elif len(forms) == 2:
         trace_two(program, forms, go, name)
     else:
         trace_three(program, forms, go, name)
 
 
-def _product(a: Components, b: Components) -> Any:
+def _sum_products(a: Components, b: Components) -> Any:
     """Σ a_i b_i."""
     return sum(x * y for x, y in zip(a, b, strict=True))
 
@@ -176,7 +176,7 @@ def _solve_row(row: Components, R: Components) -> list[Any]:
     return found
 
 
-def _deficient(M: Array, twists: Array, cones: Array) -> Array:
+def _bound_deficient(M: Array, twists: Array, cones: Array) -> Array:
     """Return the bounds (4, n) where a twist is not observed: infinite where it moves the platform, else those of the
     observed ones; NaN where M is NaN."""
     finite = np.asarray(np.isfinite(M).all(axis=(1, 2)))
@@ -185,32 +185,34 @@ def _deficient(M: Array, twists: Array, cones: Array) -> Array:
     d = M.shape[2]
     values = np.zeros((len(M), d))
     values[:, : s.shape[1]] = s
-    seen = values > RANK_CUTOFF * np.maximum(values[:, :1], 1e-300)
+    seen = values > RANK_CUTOFF_FRACTION * np.maximum(values[:, :1], 1e-300)
     found = np.full((4, len(M)), np.nan)
     for row, part in enumerate((twists[..., :3, :], twists[..., 3:, :])):
         along = np.broadcast_to(part, (len(M), 3, d)) @ full.transpose(0, 2, 1)
-        gone = np.linalg.norm(along * ~seen[:, None], axis=(1, 2)) > RANK_CUTOFF * np.linalg.norm(along, axis=(1, 2))
+        gone = np.linalg.norm(along * ~seen[:, None], axis=(1, 2)) > RANK_CUTOFF_FRACTION * np.linalg.norm(
+            along, axis=(1, 2)
+        )
         P = along * (seen / np.where(seen, values, 1.0))[:, None]
         J = P[:, :, : s.shape[1]] @ U[:, :, : s.shape[1]].transpose(0, 2, 1)
-        for number, value in enumerate(bounds_of_maps(J * np.repeat(cones, 3), freedom(part))):
+        for number, value in enumerate(bound_map_errors(J * np.repeat(cones, 3), find_error_direction(part))):
             found[2 * row + number] = np.where(finite, np.where(gone, np.inf, value), np.nan)
     return found
 
 
-def bounds_of_maps(J: Array, only: Array | None) -> tuple[Array, Array]:
+def bound_map_errors(J: Array, only: Array | None) -> tuple[Array, Array]:
     """The bounds (n,) for maps J (n, 3, 3 k) of k unit balls to the platform's error, ``only`` along a direction (3,)
     where one is given."""
     blocks = J.reshape(len(J), 3, -1, 3)
     B = np.einsum("naic,nbic->niab", blocks, blocks)
     entries = np.stack([B[:, :, a, b] for a, b in ENTRIES], axis=2)
     if only is not None:
-        found = np.sum([error_along(entries[:, i].T, only) for i in range(entries.shape[1])], axis=0)
+        found = np.sum([compute_error_along(entries[:, i].T, only) for i in range(entries.shape[1])], axis=0)
         return found, found
-    return largest_errors(list(entries.transpose(1, 2, 0)))
+    return compute_largest_errors(list(entries.transpose(1, 2, 0)))
 
 
 @lru_cache(maxsize=16)
-def _maximum_of(k: int) -> Program:
+def _build_maximum_program(k: int) -> Program:
     """The program of the maximum alone, for the entries of k forms."""
     program = Program.of(**{f"form_{i}": 6 for i in range(k)})
     program.apply(lambda: {"always": [1.0]}, state=["always"])
@@ -218,7 +220,9 @@ def _maximum_of(k: int) -> Program:
     return program
 
 
-def largest_errors(B: Sequence[Array], *, compiled: Compiled = False) -> tuple[Array, Array]:
+def compute_largest_errors(B: Sequence[Array], *, compiled: Compiled = False) -> tuple[Array, Array]:
     """The largest error and a lower bound of it, (n,) each, for the entries (6, n) of forms B_i."""
-    upper, lower = _maximum_of(len(B)).run(np.stack([each.T for each in B], axis=1), ["maximum"], compiled=compiled)
+    upper, lower = _build_maximum_program(len(B)).run(
+        np.stack([each.T for each in B], axis=1), ["maximum"], compiled=compiled
+    )
     return upper, lower

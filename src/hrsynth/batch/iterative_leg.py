@@ -15,19 +15,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..budgets import CHAIN_STEP, CHAIN_STEPS
-from ..geometry.so3 import exponential, logarithm
-from ..geometry.vectors import Array, cross, hat, inverse, plane_axes, times
+from ..budgets import CHAIN_CLOSURE_STEP_MAX, CHAIN_CLOSURE_STEPS_COUNT
+from ..geometry.so3 import convert_rotations_to_vectors, convert_vectors_to_rotations
+from ..geometry.vectors import Array, build_plane_axes, cross, hat, invert_pose, times
 from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.legs import Leg
 from ..mechanism.observations.direction import Direction
 from ..results import Value
-from ..tolerances import CLOSED, RANK_CUTOFF, SOLVED
+from ..tolerances import CLOSURE_RESIDUAL_TOL, CLOSURE_SOLVER_TOL, RANK_CUTOFF_FRACTION
 from .platform_coordinates import PlatformCoordinates
 
-ITERATIONS = 25
+LEG_FINAL_STEPS_COUNT = 25
 """Steps at the end of the way to a pose."""
-STRIDE = 0.2
+LEG_PATH_STEP_MAX = 0.2
 """Length of the way from one place to the next (characteristic lengths, radians)."""
 
 _FORCES = {"R": (0, 1, 2), "P": (0, 1), "C": (0, 1), "E": (2,), "S": (0, 1, 2), "U": (0, 1, 2), "F": (0, 1, 2)}
@@ -61,8 +61,8 @@ class ClosureRows(Value):
         frame = np.eye(4)
         frame[:3, 3] = joint.point
         if joint.axes:
-            frame[:3, :3] = np.column_stack((*plane_axes(joint.axis), joint.axis))
-        a, b = inverse(X_i) @ frame, inverse(X_j) @ frame
+            frame[:3, :3] = np.column_stack((*build_plane_axes(joint.axis), joint.axis))
+        a, b = invert_pose(X_i) @ frame, invert_pose(X_j) @ frame
         kind = joint.type.value
         self.forces.extend((i, j, a[:3, k], a[:3, 3] / length, b[:3, 3] / length) for k in _FORCES.get(kind, ()))
         self.moments.extend((i, j, a[:3, k], b[:3, m], 0.0) for k, m in _TURNS.get(kind, ()))
@@ -178,7 +178,7 @@ class IterativeLeg(Value):
         for _ in range(iterations):
             residual = self.ties.residual(X[live])
             size[live] = np.linalg.norm(residual, axis=1)
-            keep = size[live] > SOLVED / 10
+            keep = size[live] > CLOSURE_SOLVER_TOL / 10
             if not keep.any() or len(self.free) == 0:
                 break
             live, residual = live[keep], residual[keep]
@@ -186,7 +186,7 @@ class IterativeLeg(Value):
             damping = np.maximum(size[live] ** 2, 1e-14)
             A = J.transpose(0, 2, 1) @ J + damping[:, None, None] * np.eye(J.shape[2])
             step = -np.linalg.solve(A, J.transpose(0, 2, 1) @ residual[:, :, None])[..., 0]
-            step *= np.minimum(1.0, CHAIN_STEP / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
+            step *= np.minimum(1.0, CHAIN_CLOSURE_STEP_MAX / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
             X[live[:, None], self.free] = move_poses(X[live[:, None], self.free], step.reshape(len(live), -1, 6))
         return X, np.where(self.ties.stand(X), size, np.inf)
 
@@ -199,7 +199,7 @@ class IterativeLeg(Value):
         given = 1 if 1 not in self.free else len(self.links) - 1
         own, end = J[:, :, self.free].reshape(len(X), self.ties.count, -1), J[:, :, given]
         left, s, right = np.linalg.svd(own, full_matrices=True)
-        rank = int(np.median(np.sum(s > RANK_CUTOFF * s[:, :1], axis=1))) if s.size else 0
+        rank = int(np.median(np.sum(s > RANK_CUTOFF_FRACTION * s[:, :1], axis=1))) if s.size else 0
         wrenches = left[:, :, rank:].transpose(0, 2, 1) @ end
         back = (right[:, :rank].transpose(0, 2, 1) / s[:, None, :rank]) @ left[:, :, :rank].transpose(0, 2, 1)
         twists = np.zeros((len(X), len(self.links), 6, 6))
@@ -207,7 +207,7 @@ class IterativeLeg(Value):
         twists[:, self.free] = -(back @ end).reshape(len(X), len(self.free), 6, 6)
         minus = -hat(u)
         _, s, right = np.linalg.svd(np.concatenate([wrenches, np.zeros((len(X), 6, 6))], axis=1), full_matrices=False)
-        return u, minus @ twists[:, number, 3:], right * (s > RANK_CUTOFF)[:, :, None]
+        return u, minus @ twists[:, number, 3:], right * (s > RANK_CUTOFF_FRACTION)[:, :, None]
 
     def follow_from_zero(
         self, coordinates: PlatformCoordinates, home: Array, X: Array, span: Array
@@ -215,17 +215,21 @@ class IterativeLeg(Value):
         """Return the chain at platform poses X (n, 4, 4), followed from ``home`` in small steps, all poses at once."""
         p, R = coordinates.place(X)
         (p0,), (R0,) = coordinates.place(home[None])
-        turn = logarithm(R @ R0.T) if self.turns(coordinates) else np.zeros_like(p)
+        turn = convert_rotations_to_vectors(R @ R0.T) if self.has_rotation(coordinates) else np.zeros_like(p)
         far = np.max(np.linalg.norm(p - p0, axis=1) / self.length + np.linalg.norm(turn, axis=1), initial=0.0)
-        steps = max(1, int(np.ceil(far / STRIDE)))
+        steps = max(1, int(np.ceil(far / LEG_PATH_STEP_MAX)))
         state, residual = self.start(len(X)), np.zeros(len(X))
         for step in range(1, steps + 1):
             part = step / steps
-            there = self.end(coordinates, p0 + part * (p - p0), exponential(part * turn) @ R0 if step < steps else R)
-            state, residual = self.close(state, there, ITERATIONS if step == steps else CHAIN_STEPS)
+            there = self.end(
+                coordinates, p0 + part * (p - p0), convert_vectors_to_rotations(part * turn) @ R0 if step < steps else R
+            )
+            state, residual = self.close(
+                state, there, LEG_FINAL_STEPS_COUNT if step == steps else CHAIN_CLOSURE_STEPS_COUNT
+            )
         return IterativeLegStates(self, coordinates, state, residual, R, span)
 
-    def turns(self, coordinates: PlatformCoordinates) -> bool:
+    def has_rotation(self, coordinates: PlatformCoordinates) -> bool:
         """Return True if the end's rotation is given."""
         return self.end_link in coordinates.links
 
@@ -276,7 +280,7 @@ class IterativeLegStates(Value):
     def rows(self) -> tuple[Array, Array, NDArray[np.bool_]]:
         """u (3, n), the leg's rows of Mᵀ (3, D, n), and where the leg closes."""
         u, M, _ = self._answers
-        return u.T, (M @ self._motions).transpose(1, 2, 0), self.residual <= CLOSED
+        return u.T, (M @ self._motions).transpose(1, 2, 0), self.residual <= CLOSURE_RESIDUAL_TOL
 
     def wrenches(self) -> Array:
         """Return the wrenches of the leg on the platform, (n, 6, D)."""
@@ -287,5 +291,5 @@ def move_poses(X: Array, twists: Array) -> Array:
     """Poses (..., 4, 4) after twists (..., 6) of their origins for a unit of time."""
     found = X.copy()
     found[..., :3, 3] += twists[..., :3]
-    found[..., :3, :3] = exponential(twists[..., 3:]) @ X[..., :3, :3]
+    found[..., :3, :3] = convert_vectors_to_rotations(twists[..., 3:]) @ X[..., :3, :3]
     return found

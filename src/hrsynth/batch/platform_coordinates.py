@@ -14,12 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..closed_forms.platform_points import PlatformPoint
-from ..geometry.vectors import Array, inverse
+from ..geometry.vectors import Array, invert_pose
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import PlatformMotion
 from ..mechanism import JointType, Mechanism
 from ..results import Value
-from ..tolerances import SAME_GEOMETRY
+from ..tolerances import GEOMETRY_DIFFERENCE_TOL
 
 Frames = Mapping[str, Array]
 """Poses X_BL (m, 4, 4) of links at m closed configurations, metres."""
@@ -59,7 +59,7 @@ class SlidingLink(Value):
 
     def moved(self, X: Array, s: Array) -> Array:
         """Return the platform's poses X (n, 4, 4), displaced by the link's displacement (n,)."""
-        return _farther(X, s[:, None] * (X[:, :3, :3] @ self.along))
+        return _extend_shifts(X, s[:, None] * (X[:, :3, :3] @ self.along))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -79,7 +79,7 @@ class PlatformCoordinates(Value):
     dof: int
 
     @property
-    def constant(self) -> bool:
+    def has_constant_twists(self) -> bool:
         """Return True if the platform has the same twists at every pose."""
         return int(self.translations.shape[1] + self.rotations.shape[1]) == self.dof
 
@@ -103,12 +103,12 @@ class PlatformCoordinates(Value):
         found = {
             name: body
             for name in names
-            if motion.body and (body := _body(p, X[:, :3, :3], frames[name], length)) is not None
+            if motion.body and (body := _recognise_link_law(p, X[:, :3, :3], frames[name], length)) is not None
         }
         return cls(motion.link, motion.point, motion.translations, motion.rotations, found, motion.dof)
 
 
-def sliding_links(
+def find_sliding_links(
     coordinates: PlatformCoordinates, frames: Frames, names: Sequence[str], mechanism: Mechanism
 ) -> dict[str, tuple[SlidingLink, Array]]:
     """The links that slide on one that goes with the platform, and how far they slid in all ``frames`` (m,)."""
@@ -123,37 +123,39 @@ def sliding_links(
             or (link not in names)
         ):
             continue
-        D, base = (frames[each] @ inverse(mechanism.links[each].pose) for each in (link, other))
+        D, base = (frames[each] @ invert_pose(mechanism.links[each].pose) for each in (link, other))
         axes = (1.0 if link == joint.successor else -1.0) * base[:, :3, :3] @ joint.axis
         s = np.einsum("ni,ni->n", axes, (D - base)[:, :3] @ np.append(joint.point, 1.0))
         along = X[0, :3, :3].T @ axes[0]
-        body = _body(*coordinates.place(_farther(X, s[:, None] * axes)), frames[link], mechanism.length)
-        if body is not None and np.max(np.abs(X[:, :3, :3] @ along - axes)) <= SAME_GEOMETRY:
+        body = _recognise_link_law(
+            *coordinates.place(_extend_shifts(X, s[:, None] * axes)), frames[link], mechanism.length
+        )
+        if body is not None and np.max(np.abs(X[:, :3, :3] @ along - axes)) <= GEOMETRY_DIFFERENCE_TOL:
             found[link] = SlidingLink(joint.name, along, body), s
     return found
 
 
-def _farther(X: Array, shifts: Array) -> Array:
+def _extend_shifts(X: Array, shifts: Array) -> Array:
     X = X.copy()
     X[:, :3, 3] += shifts
     return X
 
 
-def _body(p: Array, R: Array, X: Array, length: float) -> PlatformLink | None:
+def _recognise_link_law(p: Array, R: Array, X: Array, length: float) -> PlatformLink | None:
     """The law that a link's frames (m, 4, 4) obey, or None."""
     eye = np.broadcast_to(np.eye(3), R.shape)
     for turns, Q in ((True, R[0].T @ X[0, :3, :3]), (False, X[0, :3, :3])):
-        if np.max(np.abs((R @ Q if turns else Q) - X[:, :3, :3])) > SAME_GEOMETRY:
+        if np.max(np.abs((R @ Q if turns else Q) - X[:, :3, :3])) > GEOMETRY_DIFFERENCE_TOL:
             continue
         rows = np.concatenate([R, eye], axis=2).reshape(-1, 6)
         away = (X[:, :3, 3] - p).ravel()
-        b, c = np.linalg.lstsq(rows, away, rcond=SAME_GEOMETRY)[0].reshape(2, 3)
-        if np.max(np.abs(rows @ np.concatenate([b, c]) - away)) <= SAME_GEOMETRY * length:
+        b, c = np.linalg.lstsq(rows, away, rcond=GEOMETRY_DIFFERENCE_TOL)[0].reshape(2, 3)
+        if np.max(np.abs(rows @ np.concatenate([b, c]) - away)) <= GEOMETRY_DIFFERENCE_TOL * length:
             return PlatformLink(turns, Q, b, c)
     return None
 
 
-def frames_at(configurations: Sequence[ClosedConfiguration]) -> dict[str, Array]:
+def collect_frames(configurations: Sequence[ClosedConfiguration]) -> dict[str, Array]:
     """Poses (m, 4, 4) of all links at closed configurations."""
     names = tuple(configurations[0].model.mechanism.links)
     X = np.array([at.model.poses(at.q, names) for at in configurations])

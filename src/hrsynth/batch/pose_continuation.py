@@ -9,68 +9,68 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..budgets import FIRST_CELLS, SWEEP_HALVINGS
-from ..errors import NotSampled, PoseNotReached
-from ..geometry.ranks import range_basis
+from ..budgets import FIRST_GRID_CELLS_COUNT, SWEEP_STEP_HALVINGS_MAX
+from ..errors import PoseReachFailure, SamplingFailure
+from ..geometry.ranks import compute_range_basis
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.continuation import HALVINGS, are_dependent, nearest, track
-from ..kinematics.leg_reach import beyond_rods, worst_leg
-from ..kinematics.limits import at_end, wrists_beyond
+from ..kinematics.continuation import CONTINUATION_HALVINGS_MAX, find_nearest, is_goal_dependent, track
+from ..kinematics.leg_reach import find_beyond_rods, find_worst_leg
+from ..kinematics.limits import find_tilt_at_end, list_tilts_beyond
 from ..kinematics.platform_motion import PlatformMotion, PoseTask
-from ..kinematics.tasks import Task, system
+from ..kinematics.tasks import Task, stack_task
 from ..kinematics.velocity_relation import ObservationModel
-from ..kinematics.walking import random_walk
+from ..kinematics.walking import walk_randomly
 from ..mechanism.pose import Grid, Pose
 from ..progress import report
-from ..tolerances import AS_PRINTED, EASY_RANK, NEAR_FOLD
+from ..tolerances import FOLD_SINGULAR_VALUE_TOL, GOAL_DIRECTION_CUTOFF_FRACTION, PRINTED_POSE_TOL
 
 if TYPE_CHECKING:
     from .configuration_builder import ConfigurationBuilder
 
 
-def generic_motion(start: ClosedConfiguration, observation_model: ObservationModel) -> PlatformMotion:
+def find_generic_motion(start: ClosedConfiguration, observation_model: ObservationModel) -> PlatformMotion:
     """Return the generic motion of the platform, from a few random configurations."""
-    return PlatformMotion.of(random_walk(start, 4, steps=2), observation_model)
+    return PlatformMotion.of(walk_randomly(start, 4, steps=2), observation_model)
 
 
-def reach(
+def track_to_pose(
     start: ClosedConfiguration, observation_model: ObservationModel, pose: Pose, motion: PlatformMotion | None = None
 ) -> ClosedConfiguration:
     """The configuration at ``pose`` that small steps lead to from ``start``; free parts are nearest to their values at
     the zero configuration (characteristic lengths, radians).
 
     ``motion`` is what the platform generically does (default: found by a random walk). Raises ``BadRequest`` for parts
-    that it cannot change, ``PoseNotReached`` where the way ends before the pose.
+    that it cannot change, ``PoseReachFailure`` where the way ends before the pose.
     """
-    motion = motion or generic_motion(start, observation_model)
+    motion = motion or find_generic_motion(start, observation_model)
     robot = start.model.mechanism.name
     goal = motion.goal(pose, robot)
-    here, came = _lead_from(start, lambda: _origins(start, motion, goal), motion, goal)
-    found = nearest(here, goal, motion.at_home()) if came == 1 else here
+    here, came = _lead_from(start, lambda: _list_origins(start, motion, goal), motion, goal)
+    found = find_nearest(here, goal, motion.at_home()) if came == 1 else here
     if came < 1 or not _has_arrived(found, goal):
-        missed = worst_leg(start.model, motion, goal)
+        missed = find_worst_leg(start.model, motion, goal)
         last = str(motion.pose(here.pose(motion.link)))
-        wrist = at_end(here)
+        wrist = find_tilt_at_end(here)
         why = (
             None
             if missed or wrist
-            else (dependence(start, motion, goal, "this pose", came == 0) or _lost_rank(start, here))
+            else (explain_dependence(start, motion, goal, "this pose", came == 0) or _explain_rank_loss(start, here))
         )
-        raise PoseNotReached(robot, str(pose), came, last, missed, wrist=wrist, why=why)
+        raise PoseReachFailure(robot, str(pose), came, last, missed, wrist=wrist, why=why)
     return found
 
 
-def dependence(
+def explain_dependence(
     start: ClosedConfiguration, motion: PlatformMotion, goal: PoseTask, what: str, stuck: bool = False
 ) -> str | None:
     """Return a text on parts of desired poses (``what``) that depend on each other, at zero and elsewhere, or where the
     path is ``stuck`` at zero, there; None if they do not. A part alone depends on nothing: the platform does not change
     it."""
     rows = goal.error_and_jacobian(start.model, start.q)[1]
-    if not are_dependent(start, rows):
+    if not is_goal_dependent(start, rows):
         return None
-    there = any(are_dependent(at, goal.error_and_jacobian(at.model, at.q)[1]) for at in _aside(start)[-1:])
+    there = any(is_goal_dependent(at, goal.error_and_jacobian(at.model, at.q)[1]) for at in _sample_beside(start)[-1:])
     if not (there or stuck):
         return None
     where = "at zero and at a random configuration" if there else "at zero, to first order,"
@@ -82,39 +82,39 @@ def dependence(
     return f"the platform has {motion.dof} dof, and {where} {why}"
 
 
-def grid_dependence(start: ClosedConfiguration, motion: PlatformMotion, grid: Grid) -> str | None:
-    """Return the text of :func:`dependence` for the poses of a grid."""
+def explain_grid_dependence(start: ClosedConfiguration, motion: PlatformMotion, grid: Grid) -> str | None:
+    """Return the text of :func:`explain_dependence` for the poses of a grid."""
     goal = motion.goal(next(iter(grid.poses_at([(0,) * grid.ndim]))), start.model.mechanism.name)
-    return dependence(start, motion, goal, "these poses")
+    return explain_dependence(start, motion, goal, "these poses")
 
 
-def _aside(start: ClosedConfiguration) -> list[ClosedConfiguration]:
+def _sample_beside(start: ClosedConfiguration) -> list[ClosedConfiguration]:
     """Random configurations beside ``start``; none where every step from it comes near a singularity."""
     try:
-        return list(random_walk(start, 8, steps=2))
-    except NotSampled:
+        return list(walk_randomly(start, 8, steps=2))
+    except SamplingFailure:
         return []
 
 
-def _origins(start: ClosedConfiguration, motion: PlatformMotion, goal: PoseTask) -> list[ClosedConfiguration]:
+def _list_origins(start: ClosedConfiguration, motion: PlatformMotion, goal: PoseTask) -> list[ClosedConfiguration]:
     """Return the configurations from which paths to goals with these parts may start besides ``start``: beside it, if
     the platform changes fewer of these parts at ``start`` than there, though it has all its dof (a rotation that two
     others make together)."""
     rows = goal.error_and_jacobian(start.model, start.q)[1]
-    if not are_dependent(start, rows):
+    if not is_goal_dependent(start, rows):
         return []
-    if _parts_changed(start, motion.at_home().error_and_jacobian(start.model, start.q)[1]) < motion.dof:
+    if _count_free_parts(start, motion.at_home().error_and_jacobian(start.model, start.q)[1]) < motion.dof:
         return []
     return [
         at
-        for at in _aside(start)
-        if _parts_changed(at, goal.error_and_jacobian(at.model, at.q)[1]) > _parts_changed(start, rows)
+        for at in _sample_beside(start)
+        if _count_free_parts(at, goal.error_and_jacobian(at.model, at.q)[1]) > _count_free_parts(start, rows)
     ]
 
 
-def _parts_changed(at: ClosedConfiguration, rows: Array) -> int:
+def _count_free_parts(at: ClosedConfiguration, rows: Array) -> int:
     """Return the number of parts with Jacobian ``rows`` (k, nv) that change independently, with closed loops."""
-    return range_basis(rows @ at.kernel()[0], 1.0)[1].value
+    return compute_range_basis(rows @ at.kernel()[0], 1.0)[1].value
 
 
 def _lead_from(
@@ -122,7 +122,7 @@ def _lead_from(
     beside: Callable[[], Sequence[ClosedConfiguration]],
     motion: PlatformMotion,
     goal: PoseTask,
-    halvings: int = HALVINGS,
+    halvings: int = CONTINUATION_HALVINGS_MAX,
 ) -> tuple[ClosedConfiguration, float]:
     """Return the end of small steps to a goal, as :func:`.steps.track`: from ``here``, or else from the two ``beside``
     that are nearest to the goal."""
@@ -135,17 +135,19 @@ def _lead_from(
     return led
 
 
-def _lost_rank(start: ClosedConfiguration, here: ClosedConfiguration) -> str | None:
+def _explain_rank_loss(start: ClosedConfiguration, here: ClosedConfiguration) -> str | None:
     """Return a text if the path ended where the loops lose rank."""
     kept, left = start.strengths, here.strengths
-    if len(left) == len(kept) and (not len(kept) or left[-1] > EASY_RANK * kept[-1]):
+    if len(left) == len(kept) and (not len(kept) or left[-1] > GOAL_DIRECTION_CUTOFF_FRACTION * kept[-1]):
         return None
     return "on the straight path to it the loops lose rank (a constraint singularity), which small steps do not pass"
 
 
 def _has_arrived(at: ClosedConfiguration, goal: PoseTask) -> bool:
     """Return True if a configuration is at the desired pose, by its matrix, and no tilt limit is exceeded."""
-    return goal.is_met(at.pose(goal.link), AS_PRINTED * max(1.0, at.model.length)) and not wrists_beyond(at.model, at.q)
+    return goal.is_met(at.pose(goal.link), PRINTED_POSE_TOL * max(1.0, at.model.length)) and not list_tilts_beyond(
+        at.model, at.q
+    )
 
 
 def sweep(
@@ -160,16 +162,18 @@ def sweep(
 
     A ``placer`` gives them at once where the legs are known subproblems and free parts can stay as they are at zero;
     only the others are led there step by step."""
-    motion = motion or generic_motion(start, observation_model)
+    motion = motion or find_generic_motion(start, observation_model)
     goals = [motion.goal(pose, start.model.mechanism.name) for pose in grid.poses()]
     home = motion.at_home()
-    from .grids import ready
+    from .grids import find_ready_configurations
 
     at_once, hopeless = (
-        ({}, beyond_rods(start.model.mechanism, motion, goals)) if placer is None else (ready(placer, motion, goals))
+        ({}, find_beyond_rods(start.model.mechanism, motion, goals))
+        if placer is None
+        else (find_ready_configurations(placer, motion, goals))
     )
 
-    beside = cache(lambda: _origins(start, motion, goals[0]))
+    beside = cache(lambda: _list_origins(start, motion, goals[0]))
 
     def lead(cell: int, origin: ClosedConfiguration, halvings: int) -> ClosedConfiguration | None:
         if cell in hopeless:
@@ -178,7 +182,7 @@ def sweep(
             there, came = at_once[cell], 1.0
         else:
             there, came = _lead_from(origin, beside, motion, goals[cell], halvings)
-            there = nearest(there, goals[cell], home) if came == 1 else there
+            there = find_nearest(there, goals[cell], home) if came == 1 else there
         return there if came == 1 and _has_arrived(there, goals[cell]) else None
 
     return spread(start, grid.shape, goals, lead, at_once)
@@ -199,37 +203,37 @@ def spread(
     found: dict[int, ClosedConfiguration] = {}
     queue: deque[tuple[int, int]] = deque()
     distance = [float(np.linalg.norm(goal.error_and_jacobian(model, start.q)[0])) for goal in goals]
-    rank = range_basis(system(model, start.q, goals[0])[1])[1].value
+    rank = compute_range_basis(stack_task(model, start.q, goals[0])[1])[1].value
 
     def settle(cell: int, origin: ClosedConfiguration, halvings: int) -> None:
         there = lead(cell, origin, halvings)
         if there is not None:
             found[cell] = there
-            queue.extend((other, cell) for other in _neighbours(cell, shape) if other not in found)
+            queue.extend((other, cell) for other in _list_neighbours(cell, shape) if other not in found)
             report("poses")
 
     @cache
     def is_fold(cell: int) -> bool:
-        J = system(model, found[cell].q, goals[cell])[1]
-        return bool(np.linalg.svd(J, compute_uv=False)[rank - 1] <= NEAR_FOLD)
+        J = stack_task(model, found[cell].q, goals[cell])[1]
+        return bool(np.linalg.svd(J, compute_uv=False)[rank - 1] <= FOLD_SINGULAR_VALUE_TOL)
 
     alone = False
-    for first in sorted(range(len(distance)), key=lambda i: (round(distance[i], 9), i))[:FIRST_CELLS]:
+    for first in sorted(range(len(distance)), key=lambda i: (round(distance[i], 9), i))[:FIRST_GRID_CELLS_COUNT]:
         if first in found:
             continue
         before = len(found)
-        settle(first, start, HALVINGS)
+        settle(first, start, CONTINUATION_HALVINGS_MAX)
         while queue:
             cell, origin = queue.popleft()
             if cell not in found and (cell in at_once or not is_fold(origin)):
-                settle(cell, found[origin], SWEEP_HALVINGS)
+                settle(cell, found[origin], SWEEP_STEP_HALVINGS_MAX)
         alone |= len(found) == before + 1
         if found and not alone:
             break
     return tuple(found.get(cell) for cell in range(len(goals)))
 
 
-def _neighbours(cell: int, shape: tuple[int, ...]) -> Iterator[int]:
+def _list_neighbours(cell: int, shape: tuple[int, ...]) -> Iterator[int]:
     """The cells next to one, along each axis."""
     place = np.unravel_index(cell, shape)
     for axis, size in enumerate(shape):

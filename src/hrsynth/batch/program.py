@@ -26,9 +26,9 @@ import numpy as np
 from ..geometry.components import Components
 from ..geometry.vectors import Array
 from .sections import Indices, Kernel, KernelLoop, Section, put, take_places
-from .tape import LANES, Store, Symbol, Tape
+from .tape import TAPE_LANES_COUNT, Store, Symbol, Tape
 
-CHUNK = 4096
+POSE_CHUNK_COUNT = 4096
 """Poses that are worked on together, so that their arrays stay in the cache."""
 Compiled = bool | Literal["numba", "jax"]
 """Compiler of a program: True is numba, False nothing."""
@@ -128,7 +128,7 @@ class Program:
 
     def is_compiled(self, names: Sequence[str]) -> bool:
         """Return True if numba has compiled the kernels of these names, in this run or in an earlier one."""
-        file = _file_of(self.text(self._outputs(names)))
+        file = _locate_module_file(self.text(self._outputs(names)))
         return any(file.parent.glob(f"__pycache__/{file.stem}.sweep*.nbi"))
 
     def _outputs(self, names: Sequence[str]) -> list[Any]:
@@ -142,14 +142,14 @@ class Program:
         here = [(row, place) for row, place in enumerate(outputs) if isinstance(place, int)]
         index, parts = [], []
         with np.errstate(all="ignore"):
-            for start in range(0, len(flat), CHUNK):
-                given = flat[start : start + CHUNK, : self.inputs].T
+            for start in range(0, len(flat), POSE_CHUNK_COUNT):
+                given = flat[start : start + POSE_CHUNK_COUNT, : self.inputs].T
                 table = np.empty((self.count, given.shape[1]))
                 table[: self.inputs] = given
                 for step in first.steps:
                     step.run(table, self.numbers)
                 for row, place in here:
-                    found[row, start : start + CHUNK] = table[place]
+                    found[row, start : start + POSE_CHUNK_COUNT] = table[place]
                 flags = [table[section.flag] > 0 for section in others]
                 live: Indices = np.flatnonzero(np.any(flags, axis=0)) if flags else np.zeros(0, dtype=np.int64)
                 if len(live):
@@ -174,11 +174,11 @@ class Program:
         from concurrent.futures import ThreadPoolExecutor
 
         sweep, numbers = _sweep_of(self.text(outputs)), np.array([*self.numbers, 0.0])
-        with ThreadPoolExecutor(threads()) as pool:
+        with ThreadPoolExecutor(count_threads()) as pool:
             list(
                 pool.map(
-                    lambda start: sweep(flat, numbers, found, start, min(start + CHUNK, len(flat))),
-                    range(0, len(flat), CHUNK),
+                    lambda start: sweep(flat, numbers, found, start, min(start + POSE_CHUNK_COUNT, len(flat))),
+                    range(0, len(flat), POSE_CHUNK_COUNT),
                 )
             )
 
@@ -194,19 +194,19 @@ class Program:
         body: list[str] = []
         for section in self.sections:
             if section.flag is not None:
-                body.append(f"if some(m, {LANES * section.flag}):")
+                body.append(f"if some(m, {TAPE_LANES_COUNT * section.flag}):")
             for line in self._calls(section, kernels):
                 body.append(line if section.flag is None else f"    {line}")
         scatter = [
-            f"o[{row}, start + i] = m[{LANES * place} + i]"
+            f"o[{row}, start + i] = m[{TAPE_LANES_COUNT * place} + i]"
             for row, place in enumerate(outputs)
             if isinstance(place, int)
         ]
         parts = [f"@compiled\ndef kernel_{number}(m, c):\n    {lines}\n" for number, lines in enumerate(kernels)]
         return _MODULE.format(
             kernels="\n\n".join(parts),
-            size=LANES * self.count,
-            lanes=LANES,
+            size=TAPE_LANES_COUNT * self.count,
+            lanes=TAPE_LANES_COUNT,
             inputs=self.inputs,
             body="\n        ".join(body),
             scatter="\n            ".join(scatter or ["pass"]),
@@ -225,13 +225,13 @@ class Program:
             else:
                 yield from (
                     f"for _ in range({step.limit}):",
-                    f"    if not some(m, {LANES * step.open}):",
+                    f"    if not some(m, {TAPE_LANES_COUNT * step.open}):",
                     "        break",
                     f"    {name}(m, c)",
                 )
 
 
-def threads() -> int:
+def count_threads() -> int:
     """Return the number of cores that the process may use, or the smaller one of NUMBA_NUM_THREADS."""
     from numba import config
 
@@ -274,20 +274,20 @@ def sweep(x, c, o, first, end):
 
 def _sweep_of(text: str) -> Callable[..., None]:
     """The sweep of a module's text."""
-    sweep: Callable[..., None] = compiled_module(text).sweep
+    sweep: Callable[..., None] = load_compiled_module(text).sweep
     return sweep
 
 
 @lru_cache(maxsize=64)
-def compiled_module(text: str) -> Any:
+def load_compiled_module(text: str) -> Any:
     """The module of a text, compiled or from numba's cache, which goes by the file that holds the text."""
     import importlib.util
 
-    from ..description.files import replacement
+    from ..description.files import open_replacement
 
-    file = _file_of(text)
+    file = _locate_module_file(text)
     if not file.exists() or file.read_text(encoding="utf-8") != text:
-        with replacement(file) as draft:
+        with open_replacement(file) as draft:
             draft.write_text(text, encoding="utf-8")
     spec = importlib.util.spec_from_file_location(file.stem, file)
     assert spec is not None
@@ -298,13 +298,13 @@ def compiled_module(text: str) -> Any:
     return module
 
 
-def _file_of(text: str) -> Path:
+def _locate_module_file(text: str) -> Path:
     """Return the path of a module's text."""
-    return _home() / f"kernels_{hashlib.sha256(text.encode()).hexdigest()[:24]}.py"
+    return _choose_cache_folder() / f"kernels_{hashlib.sha256(text.encode()).hexdigest()[:24]}.py"
 
 
 @lru_cache(maxsize=1)
-def _home() -> Path:
+def _choose_cache_folder() -> Path:
     """A folder of the user's for compiled kernels; one of this run where that cannot be written."""
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "hrsynth" / "kernels"
     try:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-LANES = 16
+TAPE_LANES_COUNT = 16
 """Poses that run through compiled code side by side; constant strides let the compiler use vector instructions."""
 UFUNCS = {
     "+": "add",
@@ -42,18 +42,18 @@ class Symbol:
         self.tape, self.number = tape, number
 
     def __add__(self, other: Any) -> Any:
-        return self if _is(other, 0.0) else self.tape.make("+", self, other)
+        return self if _is_constant(other, 0.0) else self.tape.make("+", self, other)
 
     def __sub__(self, other: Any) -> Any:
-        return self if _is(other, 0.0) else self.tape.make("-", self, other)
+        return self if _is_constant(other, 0.0) else self.tape.make("-", self, other)
 
     def __rsub__(self, other: Any) -> Any:
         return self.tape.make("-", other, self)
 
     def __mul__(self, other: Any) -> Any:
-        if _is(other, 0.0):
+        if _is_constant(other, 0.0):
             return 0.0
-        return self if _is(other, 1.0) else self.tape.make("*", self, other)
+        return self if _is_constant(other, 1.0) else self.tape.make("*", self, other)
 
     __radd__, __rmul__ = __add__, __mul__
 
@@ -105,7 +105,7 @@ class Symbol:
         return self.tape.make("?", self, yes, no)
 
 
-def _is(value: Any, constant: float) -> bool:
+def _is_constant(value: Any, constant: float) -> bool:
     return isinstance(value, float | int) and value == constant
 
 
@@ -187,7 +187,7 @@ class Tape:
                 names.append(f"m[{operation[1]}]")
             elif fixed:
                 names.append(f"t{number}")
-                lines.append(f"t{number} = {_scalar(operation, inputs)}")
+                lines.append(f"t{number} = {_write_scalar(operation, inputs)}")
             elif name in LOGICAL:
                 names.append(f"t{number}")
                 lines.append(f"t{number} = {UFUNCS[name]}({', '.join(inputs)})")
@@ -212,7 +212,7 @@ class Tape:
         for number in sorted(self.needed_operations(stores)):
             operation = self.code[number]
             inputs = [f"t{each}" if isinstance(each, int) else repr(each) for each in operation[1:]]
-            text = places[operation[1]] if operation[0] == "load" else _scalar(operation, inputs)
+            text = places[operation[1]] if operation[0] == "load" else _write_scalar(operation, inputs)
             found.append((f"t{number}", text))
         return found
 
@@ -220,23 +220,27 @@ class Tape:
         """Lines on ``LANES`` poses side by side: place p of lane i is ``m[LANES p + i]``. A lane in which place
         ``live`` is not positive keeps what it has."""
         before: list[str] = []
-        inside = [] if live is None else [f"live = m[i + {LANES * live}] > 0.0"]
+        inside = [] if live is None else [f"live = m[i + {TAPE_LANES_COUNT * live}] > 0.0"]
         fixed = self.are_constant()
         for number in sorted(self.needed_operations(stores)):
             operation = self.code[number]
             inputs = [f"t{each}" if isinstance(each, int) else repr(each) for each in operation[1:]]
-            text = f"m[i + {LANES * operation[1]}]" if operation[0] == "load" else _scalar(operation, inputs)
+            text = (
+                f"m[i + {TAPE_LANES_COUNT * operation[1]}]"
+                if operation[0] == "load"
+                else _write_scalar(operation, inputs)
+            )
             (before if fixed[number] else inside).append(f"t{number} = {text}")
         for place, each in stores:
             value = f"t{each.number}" if isinstance(each, Symbol) else repr(each)
             if isinstance(each, Symbol) and self.code[each.number][0] in LOGICAL:
                 value = f"1.0 if {value} else 0.0"
-            target = f"m[i + {LANES * place}]"
+            target = f"m[i + {TAPE_LANES_COUNT * place}]"
             inside.append(f"{target} = {value}" if live is None else f"{target} = ({value}) if live else {target}")
-        return [*before, f"for i in range({LANES}):", *(f"    {line}" for line in inside)]
+        return [*before, f"for i in range({TAPE_LANES_COUNT}):", *(f"    {line}" for line in inside)]
 
 
-def _scalar(operation: tuple[Any, ...], inputs: Sequence[str]) -> str:
+def _write_scalar(operation: tuple[Any, ...], inputs: Sequence[str]) -> str:
     """An operation on single numbers, in Python."""
     name = operation[0]
     if name == "number":

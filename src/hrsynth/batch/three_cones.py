@@ -17,15 +17,15 @@ from __future__ import annotations
 from typing import Any
 
 from ..geometry.components import Components, dot, scale, sqrt, times, where
-from ..tolerances import CONES_TIGHT
-from .cones import error_along, larger, largest_eigenvalue, positive, trace_root
+from ..tolerances import CONE_SET_GAP_TOL
+from .cones import choose_larger, clear_zero, compute_error_along, find_largest_eigenvalue, trace_root
 from .program import Program
 
-ASCENT = 10
+CONE_ASCENT_STEPS_COUNT = 10
 """Steps of the ascent from each of its starts; four times as many follow from the best end."""
-ROUNDS = 30
+CONE_BOUND_ROUNDS_MAX = 30
 """Rounds in which the upper bound is lowered."""
-BISECTIONS = 10
+CONE_ROUND_BISECTIONS_COUNT = 10
 """Halvings with which the way of a round is found."""
 
 
@@ -37,7 +37,7 @@ def trace_three(program: Program, forms: list[str], go: str, name: str) -> None:
     def start(*given: Components) -> dict[str, Components]:
         B, (on,) = given[:k], given[k:]
         return {
-            w: largest_eigenvalue(weigh(B, [1.0 / positive(trace_root(each)) for each in B]))[1],
+            w: find_largest_eigenvalue(weigh(B, [1.0 / clear_zero(trace_root(each)) for each in B]))[1],
             best: [1.0, 0.0, 0.0, -1.0],
             open_: on,
         }
@@ -45,15 +45,15 @@ def trace_three(program: Program, forms: list[str], go: str, name: str) -> None:
     def compare(*given: Components) -> dict[str, Components]:
         """Keep the better end with its E."""
         B, here, before = given[:k], given[k], given[k + 1]
-        total = sum(error_along(each, here) for each in B)
+        total = sum(compute_error_along(each, here) for each in B)
         return {best: [where(total > before[3], x, y) for x, y in zip([*here, total], before, strict=True)]}
 
     def ascend(*given: Components) -> dict[str, Components]:
-        return {w: _ascent(given[:k], given[k]), open_: given[k + 1]}
+        return {w: _take_ascent_step(given[:k], given[k]), open_: given[k + 1]}
 
     def primal(*given: Components) -> dict[str, Components]:
         B, here = given[:k], given[k]
-        return {terms: [error_along(each, here[:3]) for each in B], upper: [float("inf")]}
+        return {terms: [compute_error_along(each, here[:3]) for each in B], upper: [float("inf")]}
 
     def round_(*given: Components) -> dict[str, Components]:
         made = _round(given[:k], given[k][3], *given[k + 1 :])
@@ -64,14 +64,14 @@ def trace_three(program: Program, forms: list[str], go: str, name: str) -> None:
         for axis in (None, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]):
             if axis is not None:
                 program.apply(lambda axis=axis: {w: axis})
-            program.repeat(ascend, ASCENT, forms, (w, open_))
+            program.repeat(ascend, CONE_ASCENT_STEPS_COUNT, forms, (w, open_))
             program.apply(compare, *forms, w, best)
         program.apply(lambda best: {w: best[:3]}, best)
-        program.repeat(ascend, 4 * ASCENT, forms, (w, open_))
+        program.repeat(ascend, 4 * CONE_ASCENT_STEPS_COUNT, forms, (w, open_))
         program.apply(compare, *forms, w, best)
         program.apply(primal, *forms, w, state=(terms, upper))
-        program.repeat(round_, ROUNDS, (*forms, best), (terms, upper, open_))
-        program.apply(lambda upper, best: {name: [larger(upper[0], best[3]), best[3]]}, upper, best)
+        program.repeat(round_, CONE_BOUND_ROUNDS_MAX, (*forms, best), (terms, upper, open_))
+        program.apply(lambda upper, best: {name: [choose_larger(upper[0], best[3]), best[3]]}, upper, best)
 
 
 def weigh(B: tuple[Components, ...], weights: Components) -> list[Any]:
@@ -79,15 +79,15 @@ def weigh(B: tuple[Components, ...], weights: Components) -> list[Any]:
     return [sum(weight * form[j] for weight, form in zip(weights, B, strict=True)) for j in range(6)]
 
 
-def _ascent(B: tuple[Components, ...], w: Components) -> list[Any]:
+def _take_ascent_step(B: tuple[Components, ...], w: Components) -> list[Any]:
     """One step, w ← Σ B_i w / √(wᵀ B_i w), normalised."""
     pull: Any = [0.0, 0.0, 0.0]
     for form in B:
-        gain = error_along(form, w)
-        share = where(gain > 0.0, 1.0, 0.0) / positive(gain)
+        gain = compute_error_along(form, w)
+        share = where(gain > 0.0, 1.0, 0.0) / clear_zero(gain)
         pull = [x + y for x, y in zip(pull, scale(share, times(form, w)), strict=True)]
     size = sqrt(dot(pull, pull))
-    return [where(size > 0.0, x / positive(size), y) for x, y in zip(pull, w, strict=True)]
+    return [where(size > 0.0, x / clear_zero(size), y) for x, y in zip(pull, w, strict=True)]
 
 
 def _round(
@@ -95,25 +95,25 @@ def _round(
 ) -> tuple[Components, Components, Components]:
     """One round: √tr(B_i Z) of the next Z, the least upper bound so far, 1 where it may become smaller yet."""
     floor = 1e-12 * sum(terms) + 1e-300
-    roots = [larger(term, floor) for term in terms]
+    roots = [choose_larger(term, floor) for term in terms]
     total = sum(roots)
-    square, w = largest_eigenvalue(weigh(B, [total / root for root in roots]))
-    bound = sqrt(larger(square, 0.0))
+    square, w = find_largest_eigenvalue(weigh(B, [total / root for root in roots]))
+    bound = sqrt(choose_larger(square, 0.0))
     bound = where(bound < upper[0], bound, upper[0])
     here = [root * root for root in roots]
     rise = [dot(w, times(form, w)) - before for form, before in zip(B, here, strict=True)]
-    share = _way(here, rise)
+    share = _find_best_fraction(here, rise)
     return (
-        [sqrt(larger(before + share * more, 0.0)) for before, more in zip(here, rise, strict=True)],
+        [sqrt(choose_larger(before + share * more, 0.0)) for before, more in zip(here, rise, strict=True)],
         [bound],
-        [where(bound > lower * (1 + CONES_TIGHT), 1.0, 0.0)],
+        [where(bound > lower * (1 + CONE_SET_GAP_TOL), 1.0, 0.0)],
     )
 
 
-def _way(here: Components, rise: Components) -> Any:
+def _find_best_fraction(here: Components, rise: Components) -> Any:
     """The γ of [0, 1] that makes Σ √(here + γ rise) largest, by halving: its slope falls."""
     low: Any = 0.0
-    for halving in range(1, BISECTIONS + 1):
+    for halving in range(1, CONE_ROUND_BISECTIONS_COUNT + 1):
         middle = low + 0.5**halving
         slope = sum(more / sqrt(before + middle * more) for before, more in zip(here, rise, strict=True))
         low = where(slope > 0.0, middle, low)

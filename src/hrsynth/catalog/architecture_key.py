@@ -41,12 +41,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
-from ..budgets import LARGEST_WORD
+from ..budgets import ARCHITECTURE_KEY_LEGS_MAX
 from ..errors import BadRequest
-from ..mechanism.observations import kinds
+from ..mechanism.observations import list_kinds
 from ..mechanism.observations.encoder import Encoder
 
-VERSION = 1
+ARCHITECTURE_KEY_VERSION = 1
 """Version of the words and of the mechanisms they stand for."""
 
 AXES = {"R": 1, "P": 1, "C": 1, "U": 2, "S": 0, "Pi": 1, "2SS": 1, "2US": 1}
@@ -66,7 +66,7 @@ PLATFORMS = {"": 1, "point": 1, "bar": 2, "slide": 2}
 """Platforms, and the bodies on which legs end."""
 
 _JOINT = re.compile(r"(?P<letter>2SS|2US|Pi|[RPCUS])(?P<axes>[a-z]*)(?P<motor>\*?)(?P<watched>!?)")
-LEGS_KEPT = 10_000
+CACHED_LEG_KEYS_COUNT = 10_000
 """Legs that were read and are kept."""
 LONGEST_COUNT = 9
 """Digits of a number of legs that are read: more than any robot has."""
@@ -253,59 +253,59 @@ def parse(text: str) -> ArchitectureKey:
     platform, colon, rest = robot.rpartition(":")
     if platform not in PLATFORMS or bool(colon) != bool(platform):
         raise BadRequest(f"key {text!r}: unknown platform", platform, [name for name in PLATFORMS if name])
-    bodies = [_legs(text, part) for part in rest.split("|")]
+    bodies = [_parse_legs(text, part) for part in rest.split("|")]
     if len(bodies) != PLATFORMS[platform]:
         raise BadRequest(f"key {text!r}: number of platform links", len(bodies), str(PLATFORMS[platform]))
-    word = ArchitectureKey.of(*bodies, platform=platform, seen=sights(seen) if at else ())
+    word = ArchitectureKey.of(*bodies, platform=platform, seen=parse_observations(seen) if at else ())
     if at and any(leg.observed is not None for leg in word.legs):
         raise BadRequest(f"key {text!r}: sensors replace observed links", remedy="Omit ! or the part after @.")
-    if not 2 <= len(word.legs) <= LARGEST_WORD:
-        raise BadRequest(f"key {text!r}: number of legs", len(word.legs), f"2 to {LARGEST_WORD}")
+    if not 2 <= len(word.legs) <= ARCHITECTURE_KEY_LEGS_MAX:
+        raise BadRequest(f"key {text!r}: number of legs", len(word.legs), f"2 to {ARCHITECTURE_KEY_LEGS_MAX}")
     return word
 
 
-def sights(text: str) -> tuple[SightWord, ...]:
+def parse_observations(text: str) -> tuple[SightWord, ...]:
     """Parse sensors, in canonical order; raises ``BadRequest``."""
-    known, found = [name for name, kind in kinds().items() if not issubclass(kind, Encoder)], list[SightWord]()
+    known, found = [name for name, kind in list_kinds().items() if not issubclass(kind, Encoder)], list[SightWord]()
     for term in text.split("+"):
         match = _SIGHTS.fullmatch(term.strip())
         count = int(match["count"][:LONGEST_COUNT] or 1) if match else 0
-        if match is None or match["kind"] not in known or not 1 <= count <= LARGEST_WORD:
+        if match is None or match["kind"] not in known or not 1 <= count <= ARCHITECTURE_KEY_LEGS_MAX:
             raise BadRequest(
                 f"sensors {text!r}: unknown term",
                 term,
                 known,
-                remedy=f"Write 1 to {LARGEST_WORD} of a kind, such as 3point, and join kinds by +.",
+                remedy=f"Write 1 to {ARCHITECTURE_KEY_LEGS_MAX} of a kind, such as 3point, and join kinds by +.",
             )
         found += [SightWord(match["kind"], bool(match["own"]))] * count
     return tuple(sorted(found))
 
 
-def _legs(text: str, part: str) -> list[LegKey]:
+def _parse_legs(text: str, part: str) -> list[LegKey]:
     found: list[LegKey] = []
     for term in part.split("+"):
         match = _LEGS.fullmatch(term.strip())
         if match is None:
             raise BadRequest(f"key {text!r}: no legs", term, remedy="Write legs such as 3(Rz*-Rz-Rz), joined by +.")
         count = int(match["count"][:LONGEST_COUNT] or 1)
-        if not 1 <= count <= LARGEST_WORD:
-            raise BadRequest(f"key {text!r}: number of equal legs", count, f"1 to {LARGEST_WORD}")
+        if not 1 <= count <= ARCHITECTURE_KEY_LEGS_MAX:
+            raise BadRequest(f"key {text!r}: number of equal legs", count, f"1 to {ARCHITECTURE_KEY_LEGS_MAX}")
         try:
-            leg = _known_leg(match["leg"])
+            leg = _get_leg(match["leg"])
         except BadRequest:
-            leg = _leg(text, match["leg"])  # in words that name all of it
+            leg = _parse_leg(text, match["leg"])  # in words that name all of it
         found += [leg] * count
     return found
 
 
-@lru_cache(LEGS_KEPT)
-def _known_leg(chain: str) -> LegKey:
+@lru_cache(CACHED_LEG_KEYS_COUNT)
+def _get_leg(chain: str) -> LegKey:
     """Words have few different legs: what follows from one is found once."""
-    return _leg(chain, chain)
+    return _parse_leg(chain, chain)
 
 
-def _leg(text: str, chain: str) -> LegKey:
-    joints = tuple(_joint(text, part) for part in chain.split("-"))
+def _parse_leg(text: str, chain: str) -> LegKey:
+    joints = tuple(_parse_joint(text, part) for part in chain.split("-"))
     if joints[0].letter == "Pi" and joints[0].axes == "n":
         raise BadRequest(f"key {text!r}: axis n of the first joint", chain, remedy="Put a joint before Pin.")
     if sum(joint.watched for joint in joints) > 1:
@@ -317,7 +317,7 @@ def _leg(text: str, chain: str) -> LegKey:
     return LegKey(joints)
 
 
-def _joint(text: str, part: str) -> JointSymbol:
+def _parse_joint(text: str, part: str) -> JointSymbol:
     match = _JOINT.fullmatch(part)
     if match is None:
         raise BadRequest(f"key {text!r}: unknown joint", part, f"{', '.join(AXES)} with axes, * and !")

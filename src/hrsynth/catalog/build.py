@@ -15,13 +15,13 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from ..errors import BadRequest, BuildStopped, HrsynthError
-from .executors import Executor, Made, Stopped, executor
+from ..errors import BadRequest, BuildInterruption, HrsynthError
+from .executors import Executor, Made, WorkInterruption, open_executor
 from .journal import Journal
-from .jsonl import leading_word, line, word_of
+from .jsonl import format_line, parse_word, read_leading_word
 from .store import Folder, Store, store
 
-CHUNK = 8
+BUILD_CHUNK_MIN = 8
 """Least number of words that a worker is given at a time."""
 
 Tell = Callable[[str, int, int], None]
@@ -62,15 +62,15 @@ class WordSource:
             yield chunk
 
 
-def architectures() -> WordSource:
+def list_architectures() -> WordSource:
     """The catalog itself."""
-    from .entry import entry
+    from .entry import build_entry
     from .groups import EVERY
 
-    return WordSource(EVERY, entry, without_motors)
+    return WordSource(EVERY, build_entry, remove_motors)
 
 
-def without_motors(word: str) -> str:
+def remove_motors(word: str) -> str:
     """The word without its motors: what a hidden robot is found from."""
     from .architecture_key import parse
 
@@ -79,17 +79,17 @@ def without_motors(word: str) -> str:
 
 def make_records(entry: Callable[[str], dict[str, Any]], group: str, words: Iterable[str]) -> Made:
     """Compute the lines of keys; a refused entry gives the reason. Raises ``Stopped`` for an internal error."""
-    return [(word, line({**_record(entry, word), "key": word, "group": group})) for word in words]
+    return [(word, format_line({**_build_entry(entry, word), "key": word, "group": group})) for word in words]
 
 
-def _record(entry: Callable[[str], dict[str, Any]], word: str) -> dict[str, Any]:
+def _build_entry(entry: Callable[[str], dict[str, Any]], word: str) -> dict[str, Any]:
     try:
         return entry(word)
     except HrsynthError as error:
         return {"refused": "; ".join(error.lines())}
     except Exception as error:
         what = " ".join(f"{type(error).__name__}: {error}".split())
-        raise Stopped(f"{word}: internal error: {what}. Report it with the command") from error
+        raise WorkInterruption(f"{word}: internal error: {what}. Report it with the command") from error
 
 
 @dataclass(frozen=True)
@@ -133,13 +133,13 @@ def build(
     ------
     BadRequest
         For an unknown group, a target that cannot be written or is of another version, another build at work.
-    BuildStopped
+    BuildInterruption
         For a full disk, a worker or a cluster that died; what was built is kept.
     MissingExtra
         If joblib or dask is not installed.
     """
-    source, tell = source or architectures(), tell or (lambda *_: None)
-    kept, team, done = store(target), executor(workers, cluster), list[Built]()
+    source, tell = source or list_architectures(), tell or (lambda *_: None)
+    kept, team, done = store(target), open_executor(workers, cluster), list[Built]()
     with ExitStack() as stack:
         journals = {group: stack.enter_context(kept.journal(group, anew=anew)) for group in source.choose(groups)}
         words = {group: source.words(group) for group in journals}
@@ -166,7 +166,7 @@ def _group(
 ) -> Built:
     wanted = [word for word in words if word not in journal]
     before, now = len(words) - len(wanted), 0
-    for part in made_by(team, source, group, wanted[:limit], str(journal.path)):
+    for part in build_entries(team, source, group, wanted[:limit], str(journal.path)):
         journal.add(part)
         now += len(part)
         tell(group, before + now, len(words))
@@ -179,18 +179,18 @@ def _group(
 def _write(kept: Store, group: str, journal: Journal, words: Sequence[str]) -> None:
     try:
         kept.write(group, journal.lines(words))
-    except BuildStopped as stopped:
-        raise BuildStopped(stopped.reason, str(journal.path)) from None
+    except BuildInterruption as stopped:
+        raise BuildInterruption(stopped.reason, str(journal.path)) from None
 
 
-def made_by(
+def build_entries(
     team: Executor, source: WordSource, group: str, words: Sequence[str], kept: str | None = None
 ) -> Iterator[Made]:
-    """The records of words in parts, in any order; raises ``BuildStopped`` where they cannot be made."""
+    """The records of words in parts, in any order; raises ``BuildInterruption`` where they cannot be made."""
     try:
-        yield from team(partial(make_records, source.entry, group), source.chunks(words, CHUNK))
-    except Stopped as stopped:
-        raise BuildStopped(str(stopped), kept) from stopped
+        yield from team(partial(make_records, source.entry, group), source.chunks(words, BUILD_CHUNK_MIN))
+    except WorkInterruption as stopped:
+        raise BuildInterruption(str(stopped), kept) from stopped
 
 
 def check(
@@ -209,22 +209,22 @@ def check(
     All keys of the groups (default: all) are compared, and all entries or those of ``sample`` keys of each group, drawn
     with ``seed``.
     """
-    source = source or architectures()
+    source = source or list_architectures()
     kept = store(target) if isinstance(target, str | Path) else target
-    team, chosen = executor(workers, cluster), source.choose(groups)
+    team, chosen = open_executor(workers, cluster), source.choose(groups)
     return tuple(
         complaint
         for group in chosen
-        for complaint in _stale(kept, group, source, team, sample, seed, tell or (lambda *_: None))
+        for complaint in _list_stale_keys(kept, group, source, team, sample, seed, tell or (lambda *_: None))
     )
 
 
-def _stale(
+def _list_stale_keys(
     kept: Store, group: str, source: WordSource, team: Executor, sample: int | None, seed: int, tell: Tell
 ) -> Iterator[str]:
     try:
         lines = kept.lines([group], {})
-        stored = {word_of(line, str(kept.file(group))): line for line in lines}
+        stored = {parse_word(line, str(kept.file(group))): line for line in lines}
     except BadRequest as error:
         yield f"{group}: {error}"
         return
@@ -232,18 +232,18 @@ def _stale(
         yield f"{group}: not in {kept.path}"
         return
     words = source.words(group)
-    if isinstance(kept, Folder) and list(lines) != sorted(lines, key=leading_word):
+    if isinstance(kept, Folder) and list(lines) != sorted(lines, key=read_leading_word):
         yield f"{group}: {kept.file(group)} is not sorted"
-    yield from _some(group, "missing", [word for word in words if word not in stored])
-    yield from _some(group, "no longer of the group", sorted(stored.keys() - set(words)))
+    yield from _describe_some(group, "missing", [word for word in words if word not in stored])
+    yield from _describe_some(group, "no longer of the group", sorted(stored.keys() - set(words)))
     both = _draw_words([word for word in words if word in stored], sample, seed)
     differ: list[str] = []
-    for part in _count_parts(made_by(team, source, group, both), group, len(both), tell):
+    for part in _count_parts(build_entries(team, source, group, both), group, len(both), tell):
         differ += [word for word, line in part if line != stored[word]]
-    yield from _some(group, f"of {len(both)} compared with other records today", sorted(differ))
+    yield from _describe_some(group, f"of {len(both)} compared with other records today", sorted(differ))
 
 
-def _some(group: str, what: str, words: Sequence[str]) -> Iterator[str]:
+def _describe_some(group: str, what: str, words: Sequence[str]) -> Iterator[str]:
     """One line for the words of which something is wrong."""
     if words:
         yield f"{group}: {len(words)} {what}, the first {words[0]}"

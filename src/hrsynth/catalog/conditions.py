@@ -10,11 +10,11 @@ from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
-from ..budgets import LARGEST_RECORD
+from ..budgets import CATALOG_LINE_CHARACTERS_MAX
 from ..errors import BadRequest
-from .architecture_key import LONGEST_COUNT, MOVED, count_equal, sights
-from .jsonl import FLAGS, LINE_START, REBUILD, Record, is_written, leading_word, record
-from .known import kinds, kinds_called, known_as
+from .architecture_key import LONGEST_COUNT, MOVED, count_equal, parse_observations
+from .jsonl import FLAGS, LINE_START, REBUILD, Record, is_written, parse_record, read_leading_word
+from .known import find_named_kinds, list_known_names, list_leg_kinds
 
 FIELDS = (
     "key",
@@ -45,7 +45,7 @@ COLUMNS: Mapping[str, str] = {
 ``texts``."""
 BETWEEN = "\uffff"
 """Separator of texts, which no search text contains."""
-LONGEST_PATTERN = 50_000
+SQLITE_PATTERN_MAX_BYTES = 50_000
 """Bytes of a pattern, above which SQLite takes none."""
 
 
@@ -64,7 +64,7 @@ class RecordCondition:
     """Quick test of a line; None if all lines may fit."""
 
 
-def _same(value: Any) -> Any:
+def _normalise_value(value: Any) -> Any:
     """Return a value that a field may have, else None."""
     if isinstance(value, str):
         return None if re.search("[\ud800-\udfff]", value) else value
@@ -72,25 +72,25 @@ def _same(value: Any) -> Any:
     return value if fits else None
 
 
-def _letters(text: str) -> str:
+def _escape_letters(text: str) -> str:
     letters = sorted(set(text.split("+")))
     if not set(letters) <= set(MOVED):
         raise BadRequest("motors", text, MOVED, remedy="Join several by +.")
     return "+".join(letters)
 
 
-def _pattern(text: str) -> str | None:
+def _convert_pattern(text: str) -> str | None:
     """A pattern of ``*`` and ``?``, in which brackets stand for themselves."""
-    found = _same(re.sub(r"\*+", "*", text).replace("[", "[[]"))
-    return None if found is None or "\0" in found or len(found.encode()) > LONGEST_PATTERN else found
+    found = _normalise_value(re.sub(r"\*+", "*", text).replace("[", "[[]"))
+    return None if found is None or "\0" in found or len(found.encode()) > SQLITE_PATTERN_MAX_BYTES else found
 
 
-def _folded(text: str) -> bytes | None:
+def _normalise_text(text: str) -> bytes | None:
     """Return a text as it is searched."""
     return None if BETWEEN in text else text.casefold().encode("utf-8", "surrogatepass")
 
 
-def _having(name: str, read: Callable[[Any], Any] = _same) -> RecordCondition:
+def _match_field(name: str, read: Callable[[Any], Any] = _normalise_value) -> RecordCondition:
     """Make the criterion that a field has a value; 1 equals True, and 3 equals 3.0, though written differently."""
     exact = (str, bool if name in FLAGS else int)
 
@@ -101,37 +101,39 @@ def _having(name: str, read: Callable[[Any], Any] = _same) -> RecordCondition:
     return RecordCondition(f'"{name}" = {{0}}', read, hint)
 
 
-def _may_hold(sought: bytes | None) -> LineTest:
+def _make_line_test(sought: bytes | None) -> LineTest:
     """Make the test that a text may occur in a line, or in a name of its robot."""
     text = (sought or b"").decode("utf-8", "surrogatepass")
-    called = kinds_called(text)
+    called = find_named_kinds(text)
     if not re.fullmatch(r"[a-z0-9*+!.{|}()-]+( +[a-z0-9*+!.{|}()-]+)*", text):
         return lambda line: True
-    return lambda line: text in line.casefold() or (bool(called) and kinds(leading_word(line)) in called)
+    return lambda line: text in line.casefold() or (bool(called) and list_leg_kinds(read_leading_word(line)) in called)
 
 
 CONDITIONS: Mapping[str, RecordCondition] = {
-    "group": _having("group"),
-    "dof": _having("dof"),
-    "motion": _having("motion"),
-    "verdict": _having("verdict"),
-    "base_motors": _having("base_motors"),
-    "driven": _having("driven"),
-    "motors": RecordCondition("drives = {0}", _letters),
-    "parallelograms": RecordCondition("parallelograms = {0}", _same),
-    "fewest": _having("fewest"),
-    "sensor": _having("sensors", lambda text: count_equal(sights(text))),
-    "modes": _having("modes_bound"),
-    "legs": _having("legs", lambda number: _same(int(number))),
+    "group": _match_field("group"),
+    "dof": _match_field("dof"),
+    "motion": _match_field("motion"),
+    "verdict": _match_field("verdict"),
+    "base_motors": _match_field("base_motors"),
+    "driven": _match_field("driven"),
+    "motors": RecordCondition("drives = {0}", _escape_letters),
+    "parallelograms": RecordCondition("parallelograms = {0}", _normalise_value),
+    "fewest": _match_field("fewest"),
+    "sensor": _match_field("sensors", lambda text: count_equal(parse_observations(text))),
+    "modes": _match_field("modes_bound"),
+    "legs": _match_field("legs", lambda number: _normalise_value(int(number))),
     "text": RecordCondition(
-        "(text_id IN (SELECT text_id FROM texts WHERE instr(text, {0})) OR instr(lower(key), {0}))", _folded, _may_hold
+        "(text_id IN (SELECT text_id FROM texts WHERE instr(text, {0})) OR instr(lower(key), {0}))",
+        _normalise_text,
+        _make_line_test,
     ),
 }
 """Criteria by name."""
 LEG_PATTERN = RecordCondition(
     """(key GLOB {0} OR replace(key, '*', '') GLOB {0}
         OR notation IN (SELECT notation FROM chains WHERE chain GLOB {0}))""",
-    _pattern,
+    _convert_pattern,
 )
 """Criterion ``legs`` with a pattern."""
 
@@ -160,12 +162,12 @@ class RecordQuestion:
         for name, value in asked:
             terms = []
             for each in value if isinstance(value, tuple | list) else () if value is None else (value,):
-                condition, told = _condition(name, each.item() if hasattr(each, "item") else each)
+                condition, told = _build_condition(name, each.item() if hasattr(each, "item") else each)
                 values.append(told)
                 hints += [condition.hint(told)] if condition.hint else []
                 terms.append(condition.where.format(f"?{len(values)}"))
             if value is not None:
-                clauses.append(_any_of(terms))
+                clauses.append(_join_alternatives(terms))
         return cls(" AND ".join(clauses), values, hints)
 
     def columns(self) -> list[str]:
@@ -178,7 +180,7 @@ class RecordQuestion:
         return [row for (row,) in file.execute(asked, self.values)]
 
 
-def _condition(name: str, value: Any) -> tuple[RecordCondition, Any]:
+def _build_condition(name: str, value: Any) -> tuple[RecordCondition, Any]:
     """Return the criterion of one value, and the value for SQL."""
     of_texts = name in ("legs", "sensor", "text", "motors")
     if of_texts and not isinstance(value, str) and (name, type(value)) != ("legs", int):
@@ -188,26 +190,26 @@ def _condition(name: str, value: Any) -> tuple[RecordCondition, Any]:
     return condition, condition.read(value)
 
 
-def _any_of(terms: Sequence[str]) -> str:
+def _join_alternatives(terms: Sequence[str]) -> str:
     """One of these; SQLite takes no deep nesting."""
     if len(terms) < 3:
         return f"({' OR '.join(terms or ['key IS 0'])})"
     half = len(terms) // 2
-    return f"({_any_of(terms[:half])} OR {_any_of(terms[half:])})"
+    return f"({_join_alternatives(terms[:half])} OR {_join_alternatives(terms[half:])})"
 
 
 def fill(
     file: sqlite3.Connection,
     lines: Sequence[str],
     columns: Sequence[str] = tuple(COLUMNS),
-    read: Callable[[str], Record] = record,
+    read: Callable[[str], Record] = parse_record,
 ) -> None:
     """Make the tables of records, with these columns: the same bytes for the same lines. Raises what ``read`` raises
     for a line that is no record."""
     texts: dict[bytes, int] = {}
-    file.create_function("driven_kinds", 3, driven_kinds, deterministic=True)
-    file.create_function("chains_of", 1, chains, deterministic=True)
-    file.create_function("text_id", 1, lambda line: texts.setdefault(_said(read(line)), len(texts)))
+    file.create_function("driven_kinds", 3, list_motor_kinds, deterministic=True)
+    file.create_function("chains_of", 1, list_chain_names, deterministic=True)
+    file.create_function("text_id", 1, lambda line: texts.setdefault(_collect_texts(read(line)), len(texts)))
     names = ", ".join(f'"{name}"' for name in columns)
     told = ", ".join(COLUMNS[name] for name in columns)
     file.execute(f"CREATE TABLE records (record INTEGER PRIMARY KEY, {names})")
@@ -229,7 +231,7 @@ def fill(
         )
 
 
-def places(lines: Sequence[str], asked: Mapping[str, Any], read: Callable[[str], Record]) -> Sequence[int]:
+def list_matching_lines(lines: Sequence[str], asked: Mapping[str, Any], read: Callable[[str], Record]) -> Sequence[int]:
     """Return the indices of the lines that fit: quick tests first, then one criterion after the other. Entries are read
     for texts only; raises what ``read`` raises for lines that are no entries."""
     questions = [RecordQuestion.of((name, asked[name])) for name in CONDITIONS if asked.get(name) is not None]
@@ -240,31 +242,31 @@ def places(lines: Sequence[str], asked: Mapping[str, Any], read: Callable[[str],
 
     left: Sequence[int] = [i for i, line in enumerate(lines) if may_fit(line)] if hinted else range(len(lines))
     for question in questions:
-        left = [left[i] for i in _fitting([lines[i] for i in left], question, read)]
+        left = [left[i] for i in _select_lines([lines[i] for i in left], question, read)]
     return left
 
 
-def _fitting(lines: Sequence[str], question: RecordQuestion, read: Callable[[str], Record]) -> Sequence[int]:
+def _select_lines(lines: Sequence[str], question: RecordQuestion, read: Callable[[str], Record]) -> Sequence[int]:
     for line in lines:
         if not line.startswith(LINE_START):
             read(line)
     try:
         with closing(sqlite3.connect(":memory:")) as memory:
-            memory.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_RECORD)
+            memory.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, CATALOG_LINE_CHARACTERS_MAX)
             fill(memory, lines, question.columns(), read)
             return [row - 1 for row in question.rows(memory)]
     except sqlite3.Error as error:
         raise BadRequest("not a catalog entry", str(error)[:60], remedy=REBUILD) from None
 
 
-def _said(found: Record) -> bytes:
+def _collect_texts(found: Record) -> bytes:
     """All texts of a record, with the names under which its robot is known; a word is sought apart, but for one with
     letters of which SQLite knows no small ones."""
     values = [str(value) for name, value in found.items() if name != "key" or not value.isascii()]
-    return BETWEEN.join([*values, known_as(found)]).casefold().encode("utf-8", "surrogatepass")
+    return BETWEEN.join([*values, list_known_names(found)]).casefold().encode("utf-8", "surrogatepass")
 
 
-def driven_kinds(word: str, choices: str | None, dof: int) -> str:
+def list_motor_kinds(word: str, choices: str | None, dof: int) -> str:
     """Return the kinds of actuated joints ("R", "P+R") marked in a key; of a published robot those of the first choice
     of motors that determines all dof, else of the first choice."""
     listed = json.loads(choices or "[]")
@@ -276,7 +278,7 @@ def driven_kinds(word: str, choices: str | None, dof: int) -> str:
     return "+".join(sorted({letters[j - 1] for leg in chosen["joints"] for j in leg if 0 < j <= len(letters)}))
 
 
-def chains(notation: str | None) -> str:
+def list_chain_names(notation: str | None) -> str:
     """The names by which legs are found beside the word, as a list of JSON: notation and each leg's chain, with and
     without the marks of motors."""
     text = notation or ""

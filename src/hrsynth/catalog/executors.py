@@ -8,7 +8,7 @@ from functools import partial
 from itertools import islice
 from typing import Any
 
-from ..budgets import PARTS_AHEAD
+from ..budgets import PARTS_PER_THREAD_COUNT
 from ..errors import BadRequest, MissingExtra, WorkersLost
 from ..processes import run_shared
 from ..version import __version__
@@ -19,15 +19,15 @@ Task = Callable[[list[str]], Made]
 Executor = Callable[[Task, Iterable[list[str]]], Iterator[Made]]
 """Takes a task and the parts to do it on, gives what each part gave as soon as it is done."""
 
-PATIENCE = 10.0
+CLUSTER_TIMEOUT_S = 10.0
 """Seconds within which a cluster has to answer."""
 
 
-class Stopped(Exception):
+class WorkInterruption(Exception):
     """A record that cannot be made, or those who make them are gone: why."""
 
 
-def executor(workers: int = 1, cluster: str | None = None) -> Executor:
+def open_executor(workers: int = 1, cluster: str | None = None) -> Executor:
     """The executor of a number of processes, or of the cluster at an address; raises ``MissingExtra`` and
     ``BadRequest``."""
     if workers < 1:
@@ -38,8 +38,8 @@ def executor(workers: int = 1, cluster: str | None = None) -> Executor:
         _require("distributed", "a cluster")
         return lambda task, parts: _run_on_cluster(task, parts, cluster)
     if workers == 1:
-        return _alone
-    return lambda task, parts: _together(task, parts, workers)
+        return _run_alone
+    return lambda task, parts: _run_together(task, parts, workers)
 
 
 def _require(package: str, what: str) -> None:
@@ -49,17 +49,17 @@ def _require(package: str, what: str) -> None:
         raise MissingExtra(what, "cluster")
 
 
-def _alone(task: Task, parts: Iterable[list[str]]) -> Iterator[Made]:
+def _run_alone(task: Task, parts: Iterable[list[str]]) -> Iterator[Made]:
     for part in parts:
         for word in part:
             yield task([word])
 
 
-def _together(task: Task, parts: Iterable[list[str]], workers: int) -> Iterator[Made]:
+def _run_together(task: Task, parts: Iterable[list[str]], workers: int) -> Iterator[Made]:
     try:
         yield from run_shared((partial(task, part) for part in parts), workers, ordered=False)
     except WorkersLost as lost:
-        raise Stopped(lost.reason) from None
+        raise WorkInterruption(lost.reason) from None
 
 
 def _run_on_cluster(task: Task, parts: Iterable[list[str]], address: str) -> Iterator[Made]:
@@ -67,11 +67,11 @@ def _run_on_cluster(task: Task, parts: Iterable[list[str]], address: str) -> Ite
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
-        client = Client(address, timeout=PATIENCE, set_as_default=False)
+        client = Client(address, timeout=CLUSTER_TIMEOUT_S, set_as_default=False)
     except (ValueError, TypeError) as error:
         raise BadRequest(f"--cluster {address}: {error}", remedy="Write it as tcp://host:8786.") from None
     except (OSError, ImportError):
-        raise Stopped(f"no cluster answers at {address} within {PATIENCE:g} s") from None
+        raise WorkInterruption(f"no cluster answers at {address} within {CLUSTER_TIMEOUT_S:g} s") from None
     try:
         yield from _serve_parts(client, task, iter(parts))
     finally:
@@ -84,20 +84,20 @@ def _serve_parts(client: Any, task: Task, parts: Iterator[list[str]]) -> Iterato
     from concurrent.futures import CancelledError as FutureCancelled
 
     waiting: set[Any] = set()
-    ahead = PARTS_AHEAD * max(2, sum(client.nthreads().values()))
+    ahead = PARTS_PER_THREAD_COUNT * max(2, sum(client.nthreads().values()))
     try:
         while waiting := waiting | _submit(client, task, islice(parts, ahead - len(waiting))):
             done, waiting = _wait_for_parts(client, waiting)
             for future in done:
-                yield _result(future)
+                yield _take_result(future)
     except (OSError, CancelledError, FutureCancelled):
-        raise Stopped("the cluster does not answer") from None
+        raise WorkInterruption("the cluster does not answer") from None
 
 
 def _submit(client: Any, task: Task, parts: Iterable[list[str]]) -> set[Any]:
     if client.status != "running":
-        raise Stopped("the cluster does not answer")
-    return {client.submit(_with_version, task, part, pure=False) for part in parts}
+        raise WorkInterruption("the cluster does not answer")
+    return {client.submit(_run_with_version, task, part, pure=False) for part in parts}
 
 
 def _wait_for_parts(client: Any, waiting: set[Any]) -> tuple[set[Any], set[Any]]:
@@ -106,31 +106,33 @@ def _wait_for_parts(client: Any, waiting: set[Any]) -> tuple[set[Any], set[Any]]
 
     try:
         with client.as_current():
-            done, rest = wait(waiting, timeout=PATIENCE, return_when="FIRST_COMPLETED")
+            done, rest = wait(waiting, timeout=CLUSTER_TIMEOUT_S, return_when="FIRST_COMPLETED")
     except TimeoutError:
         _require_alive(client)
         return set(), waiting
     return done, rest
 
 
-def _result(future: Any) -> Made:
+def _take_result(future: Any) -> Made:
     """Return the result of a part; other errors than ``Stopped`` and lost connections are those of the workers."""
     from concurrent.futures import CancelledError
 
     from distributed.scheduler import KilledWorker
 
     if future.cancelled():
-        raise Stopped("the cluster does not answer")
+        raise WorkInterruption("the cluster does not answer")
     try:
         version, found = future.result()
-    except (Stopped, OSError, CancelledError):
+    except (WorkInterruption, OSError, CancelledError):
         raise
     except KilledWorker:
-        raise Stopped("the cluster's workers died one after the other on the same words") from None
+        raise WorkInterruption("the cluster's workers died one after the other on the same words") from None
     except Exception as error:
-        raise Stopped(f"the cluster's workers need hrsynth {__version__}: {str(error).splitlines()[0]}") from None
+        raise WorkInterruption(
+            f"the cluster's workers need hrsynth {__version__}: {str(error).splitlines()[0]}"
+        ) from None
     if version != __version__:
-        raise Stopped(f"a worker of the cluster has hrsynth {version}, not {__version__}")
+        raise WorkInterruption(f"a worker of the cluster has hrsynth {version}, not {__version__}")
     return list(found)
 
 
@@ -139,11 +141,11 @@ def _require_alive(client: Any) -> None:
     try:
         workers = client.nthreads()
     except (RuntimeError, ValueError):
-        raise Stopped("the cluster does not answer") from None
+        raise WorkInterruption("the cluster does not answer") from None
     if not workers:
-        raise Stopped("the cluster has no workers left")
+        raise WorkInterruption("the cluster has no workers left")
 
 
-def _with_version(task: Task, part: list[str]) -> tuple[str, Made]:
+def _run_with_version(task: Task, part: list[str]) -> tuple[str, Made]:
     """Run a part; return its result with the version."""
     return __version__, task(part)

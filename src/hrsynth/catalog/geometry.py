@@ -14,34 +14,34 @@ from typing import cast
 
 import numpy as np
 
-from ..description.observation_text import ObservationSpec, with_sights
+from ..description.observation_text import ObservationSpec, add_observations
 from ..errors import BadRequest
-from ..geometry.vectors import Array, perpendicular, pose, rotation_about, unit
+from ..geometry.vectors import Array, build_pose, find_perpendicular, normalise_vector, rotate_about_axis
 from ..mechanism.builder import Builder
 from ..mechanism.cameras import CameraObservation, NamedCamera
 from ..mechanism.legs import decompose
 from ..mechanism.model import Mechanism
-from ..mechanism.normal import normal_form
-from ..mechanism.observations import kinds
+from ..mechanism.normal import reduce_to_normal_form
+from ..mechanism.observations import list_kinds
 from ..mechanism.observations.direction import Direction
-from ..mechanism.sensors import default_observation, observation_of
-from ..tolerances import SQUARE_AXES
+from ..mechanism.sensors import choose_default_segment, observe_segment
+from ..tolerances import U_JOINT_COSINE_TOL
 from .architecture_key import COMPOSITE, ArchitectureKey, JointSymbol, LegKey
 
 Z = np.array([0.0, 0.0, 1.0])
 
 
 @lru_cache(maxsize=8)
-def mechanism(word: ArchitectureKey, attempt: int = 0) -> Mechanism:
+def build_mechanism(word: ArchitectureKey, attempt: int = 0) -> Mechanism:
     """The mechanism of a word: geometry from the word without its motors and the number of the attempt, metres.
 
     Raises ``BadRequest`` where the axes of a U cannot be at right angles.
     """
     drawn = _Draft(word.unseen, attempt).build()
-    return _with_sights(drawn, word, attempt) if word.seen else drawn
+    return _add_observations(drawn, word, attempt) if word.seen else drawn
 
 
-def _with_sights(drawn: Mechanism, word: ArchitectureKey, attempt: int) -> Mechanism:
+def _add_observations(drawn: Mechanism, word: ArchitectureKey, attempt: int) -> Mechanism:
     """Add the sensors of a key: points, axes and cameras in general position.
 
     The cameras see upwards from below the platform.
@@ -50,12 +50,12 @@ def _with_sights(drawn: Mechanism, word: ArchitectureKey, attempt: int) -> Mecha
     centre = drawn.links["platform"].pose[:3, 3]
     cameras, specs = dict[str, NamedCamera](), list[ObservationSpec]()
     for number, each in enumerate(word.seen, 1):
-        kind, name = kinds()[each.kind], f"camera_{number}" if each.own else "camera"
+        kind, name = list_kinds()[each.kind], f"camera_{number}" if each.own else "camera"
         by_camera = issubclass(kind, CameraObservation)
         if by_camera and name not in cameras:
             at = centre + [*rng.uniform(-0.3, 0.3, size=2), -rng.uniform(0.5, 0.7)]
-            cameras[name] = NamedCamera(name, "base", pose(at, rotation_about(rng.normal(size=3), 0.2)))
-        at, axis = 0.12 * rng.normal(size=3), unit(rng.normal(size=3))
+            cameras[name] = NamedCamera(name, "base", build_pose(at, rotate_about_axis(rng.normal(size=3), 0.2)))
+        at, axis = 0.12 * rng.normal(size=3), normalise_vector(rng.normal(size=3))
         specs.append(
             ObservationSpec(
                 each.kind,
@@ -67,15 +67,15 @@ def _with_sights(drawn: Mechanism, word: ArchitectureKey, attempt: int) -> Mecha
                 0.03 if "radius" in kind.needs else None,
             )
         )
-    return with_sights(replace(drawn, observations=()), specs, cameras.values())
+    return add_observations(replace(drawn, observations=()), specs, cameras.values())
 
 
-def planar(word: ArchitectureKey) -> bool:
+def is_planar_key(word: ArchitectureKey) -> bool:
     """Return True if all joints of a key move in the plane normal to z."""
-    return all(_in_plane(joint) for leg in word.legs for joint in leg.joints)
+    return all(_is_planar_symbol(joint) for leg in word.legs for joint in leg.joints)
 
 
-def _in_plane(joint: JointSymbol) -> bool:
+def _is_planar_symbol(joint: JointSymbol) -> bool:
     names = {"R": "z", "Pi": "z", "P": "xytrhjml"}.get(joint.letter, "")
     return bool(names) and set(joint.axes) <= set(names)
 
@@ -87,7 +87,7 @@ class _Draft:
         self.word = word
         seed = sha256(f"{word.unmoved} {attempt}".encode()).digest()
         self.rng = np.random.default_rng(np.frombuffer(seed, dtype=np.uint32))
-        self.flat = planar(word)
+        self.flat = is_planar_key(word)
         self.centre = np.append(self.rng.normal(scale=0.05, size=2), 0.0)
         if not self.flat:
             self.centre[2] = self.rng.uniform(0.7, 0.9)
@@ -107,15 +107,15 @@ class _Draft:
                 number += 1
                 angle = turn + 2 * np.pi * (number - 1 + self.rng.uniform(-0.2, 0.2)) / count
                 _Limb(self, leg, number, angle, end).add(watched)
-        return _with_segments(self.builder.build(platform="platform"), self.word, watched)
+        return _add_segments(self.builder.build(platform="platform"), self.word, watched)
 
     def _platform(self) -> tuple[str, ...]:
         """Add the platform; return the links on which legs end."""
         b = self.builder
         match self.word.platform:
             case "bar":
-                along = 0.1 * unit([*self.rng.normal(size=2), 0.0])
-                offset = 0.08 * unit(np.cross(Z, along) + 0.3 * along)
+                along = 0.1 * normalise_vector([*self.rng.normal(size=2), 0.0])
+                offset = 0.08 * normalise_vector(np.cross(Z, along) + 0.3 * along)
                 one, two = self.centre - along, self.centre + along
                 for name, at in (("plate_1", one), ("platform", self.centre), ("plate_2", two), ("twin", one + offset)):
                     b.link(name, at=at)
@@ -129,7 +129,14 @@ class _Draft:
                 self.places = {"plate": self.centre, "platform": self.centre}
                 b.link("plate", at=self.centre)
                 b.link("platform", at=self.centre)
-                b.joint("slide", "P", "plate", "platform", at=self.centre, axis=unit([*self.rng.normal(size=2), 0.0]))
+                b.joint(
+                    "slide",
+                    "P",
+                    "plate",
+                    "platform",
+                    at=self.centre,
+                    axis=normalise_vector([*self.rng.normal(size=2), 0.0]),
+                )
                 return "plate", "platform"
             case _:
                 self.places = {"platform": self.centre}
@@ -137,17 +144,17 @@ class _Draft:
                 return ("platform",)
 
 
-def _with_segments(drawn: Mechanism, word: ArchitectureKey, chords: Mapping[str, Direction]) -> Mechanism:
+def _add_segments(drawn: Mechanism, word: ArchitectureKey, chords: Mapping[str, Direction]) -> Mechanism:
     """The mechanism with the segments that the word marks, and the chord of the last link (``chords``, by leg) where
     a leg has no segment by the rules, since its axes meet in a point."""
-    decomposition = decompose(normal_form(drawn).mechanism)
+    decomposition = decompose(reduce_to_normal_form(drawn).mechanism)
     found: list[Direction] = []
     for (label, chord), leg, limb in zip(chords.items(), word.legs, decomposition.legs, strict=True):
         try:
             segment = (
-                default_observation(decomposition, limb, last=True)
+                choose_default_segment(decomposition, limb, last=True)
                 if leg.observed is None
-                else observation_of(decomposition, chord.link)
+                else observe_segment(decomposition, chord.link)
             )
         except BadRequest:
             found.append(chord)
@@ -160,7 +167,7 @@ def _with_segments(drawn: Mechanism, word: ArchitectureKey, chords: Mapping[str,
     return replace(
         drawn,
         observations=tuple(
-            told.get(leg.label) or default_observation(decomposition, leg) for leg in decomposition.legs
+            told.get(leg.label) or choose_default_segment(decomposition, leg) for leg in decomposition.legs
         ),
     )
 
@@ -177,7 +184,7 @@ class _Limb:
         self.foot = 0.5 * self.rng.uniform(0.8, 1.2) * self.radius + lift
         at = draft.places[end]
         reach = 0.0 if draft.word.platform == "point" else 0.2 * self.rng.uniform(0.8, 1.2)
-        self.tip = at + reach * rotation_about(Z, self.rng.uniform(-0.3, 0.3)) @ self.radius
+        self.tip = at + reach * rotate_about_axis(Z, self.rng.uniform(-0.3, 0.3)) @ self.radius
         if not draft.flat:
             self.tip = self.tip + 0.04 * self.rng.normal() * Z
 
@@ -194,7 +201,7 @@ class _Limb:
             line = self._line(i, starts, ends)
             axes = self._axes(joint, starts[i], line)
             if (joint.letter, joint.axes) == ("Pi", "n"):
-                axes = [unit(np.cross(last_axis, ends[i] - starts[i]))]
+                axes = [normalise_vector(np.cross(last_axis, ends[i] - starts[i]))]
             last_axis = axes[-1] if axes else last_axis
             loop = i == last and self.number > 1
             if joint.letter in COMPOSITE:
@@ -228,7 +235,7 @@ class _Limb:
         places = [self.foot]
         for step in range(1, gaps):
             aside = self.rng.normal(size=3) * ([1, 1, 0] if self.draft.flat else [1, 1, 1])
-            sideways = unit(aside - 0.7 * (aside @ unit(along)) * unit(along))
+            sideways = normalise_vector(aside - 0.7 * (aside @ normalise_vector(along)) * normalise_vector(along))
             places.append(
                 self.foot
                 + along * (step + self.rng.uniform(-0.2, 0.2)) / gaps
@@ -263,20 +270,26 @@ class _Limb:
     def _axes(self, joint: JointSymbol, at: Array, line: Array) -> list[Array]:
         """The axes of a joint, unit vectors."""
         if joint.letter != "U":
-            return [unit(line) if name in "ln" else self._vector(name, at) for name in joint.axes]
+            return [normalise_vector(line) if name in "ln" else self._vector(name, at) for name in joint.axes]
         names = joint.axes
-        known = {name: unit(line) if name == "l" else self._vector(name, at) for name in names if name not in "nq"}
+        known = {
+            name: normalise_vector(line) if name == "l" else self._vector(name, at)
+            for name in names
+            if name not in "nq"
+        }
         if not known:
             raise BadRequest(f"key {self.draft.word}: axes of a U", names, remedy="Name one other than n or q.")
         found = []
         for name, other in zip(names, reversed(names), strict=True):
             if name == "n":
-                found.append(unit(np.cross(known[other], line)))
+                found.append(normalise_vector(np.cross(known[other], line)))
             elif name == "q":
-                found.append(rotation_about(known[other], self.rng.uniform(0, 2 * np.pi)) @ perpendicular(known[other]))
+                found.append(
+                    rotate_about_axis(known[other], self.rng.uniform(0, 2 * np.pi)) @ find_perpendicular(known[other])
+                )
             else:
                 found.append(known[name])
-        if abs(found[0] @ found[1]) > SQUARE_AXES:
+        if abs(found[0] @ found[1]) > U_JOINT_COSINE_TOL:
             raise BadRequest(f"key {self.draft.word}: axes of U{names} not at right angles", remedy="Use n or q.")
         return found
 
@@ -290,7 +303,7 @@ class _Limb:
             case "r":
                 return self.radius
             case "o":
-                return unit(self.draft.common - at)
+                return normalise_vector(self.draft.common - at)
         if name not in self.own:
             self.own[name] = self._random(name)
         return self.own[name]
@@ -298,18 +311,20 @@ class _Limb:
     def _random(self, name: str) -> Array:
         """A direction of the leg's own; those in a plane keep well away from each other."""
         if name == "k":
-            return rotation_about(self.tangent, self.rng.uniform(-1.2, -0.4)) @ self.radius
+            return rotate_about_axis(self.tangent, self.rng.uniform(-1.2, -0.4)) @ self.radius
         if name in "hjm":
             turn = self.rng.uniform(0.4, 0.6) + "hjm".index(name) * np.pi / 3
-            return rotation_about(Z, turn + self.rng.uniform(0, 0.3)) @ self.radius
-        return unit(self.rng.normal(size=3) + 0.5 * self.tangent)
+            return rotate_about_axis(Z, turn + self.rng.uniform(0, 0.3)) @ self.radius
+        return normalise_vector(self.rng.normal(size=3) + 0.5 * self.tangent)
 
     def _rods(
         self, joint: JointSymbol, i: int, before: str, after: str, start: Array, end: Array, axis: Array, loop: bool
     ) -> str:
         """Adds two equal parallel rods, a parallelogram or spatial ones; gives the first."""
         b, k, rod = self.draft.builder, self.number, end - start
-        side = 0.06 * (unit(np.cross(axis, rod)) + 0.4 * unit(rod) if joint.letter == "Pi" else axis)
+        side = 0.06 * (
+            normalise_vector(np.cross(axis, rod)) + 0.4 * normalise_vector(rod) if joint.letter == "Pi" else axis
+        )
         upper = {"2SS": "S", "2US": "U", "Pi": "R"}[joint.letter]
         lower = "R" if joint.letter == "Pi" else "S"
         along = {"S": (), "R": (axis,), "U": (axis, np.cross(axis, rod))}

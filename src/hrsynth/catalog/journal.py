@@ -7,9 +7,9 @@ import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from ..description.files import open_kept, require_alone, seal_line, unseal_line
-from ..errors import BadRequest, BuildStopped
-from .jsonl import head, read_head, word_of
+from ..description.files import add_checksum, open_kept, require_alone, unseal_line
+from ..errors import BadRequest, BuildInterruption
+from .jsonl import format_head, parse_word, read_head
 
 ENDING = ".part"
 
@@ -19,7 +19,7 @@ class Journal:
 
     Each line ends with its checksum. A last line that was torn is cut off, a damaged one is passed over: those records
     are made again. Raises ``BadRequest`` for a journal of another version, one that another build has open, or one that
-    cannot be opened, ``BuildStopped`` where the disk takes no more.
+    cannot be opened, ``BuildInterruption`` where the disk takes no more.
     """
 
     def __init__(self, path: Path, group: str, *, anew: bool = False) -> None:
@@ -58,7 +58,7 @@ class Journal:
     def add(self, made: Iterable[tuple[str, str]]) -> None:
         """Append words with their lines; returns when they are on the disk."""
         made = list(made)
-        lines, place = [f"{seal_line(text)}\n" for _, text in made], self._end
+        lines, place = [f"{add_checksum(text)}\n" for _, text in made], self._end
         self._append("".join(lines))
         for (word, text), line in zip(made, lines, strict=True):
             self._places[word] = place, len(text)
@@ -87,11 +87,11 @@ class Journal:
                     read_head(text, str(self.path), f"{self.path}: not the journal of a build", None)
                 elif text is not None:
                     with contextlib.suppress(BadRequest):
-                        places[word_of(text)] = self._end, len(text)
+                        places[parse_word(text)] = self._end, len(text)
                 self._end += len(raw)
         os.ftruncate(self._file, self._end)
         if self._end == 0:
-            self._append(seal_line(head(group)) + "\n")
+            self._append(add_checksum(format_head(group)) + "\n")
         return places
 
     def _append(self, text: str) -> None:
@@ -104,5 +104,5 @@ class Journal:
         except OSError as error:
             with contextlib.suppress(OSError):
                 os.ftruncate(self._file, self._end)
-            raise BuildStopped(f"{self.path}: {error.strerror}", str(self.path)) from None
+            raise BuildInterruption(f"{self.path}: {error.strerror}", str(self.path)) from None
         self._end += len(content)

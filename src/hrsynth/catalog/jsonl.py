@@ -7,9 +7,9 @@ import zlib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from ..budgets import LARGEST_RECORD
+from ..budgets import CATALOG_LINE_CHARACTERS_MAX
 from ..errors import BadRequest
-from .architecture_key import VERSION
+from .architecture_key import ARCHITECTURE_KEY_VERSION
 
 Record = Mapping[str, Any]
 """Entry of one architecture; a missing field is unknown or does not apply."""
@@ -18,7 +18,7 @@ CHECKSUM = "crc32"
 """What the head of a file that is not packed calls the checksum of all lines behind it."""
 LINE_START, _GROUP = '{"key":"', '","group":"'
 
-FORMAT = 2
+JOURNAL_FORMAT_VERSION = 2
 """Version of the lines and the journal."""
 REBUILD = "Build it again with hrsynth catalog build."
 """Remedy for a file that is damaged or of another version."""
@@ -72,22 +72,25 @@ NEEDED = (
 """Fields of a record that is not refused."""
 
 
-def line(entry: Record) -> str:
+def format_line(entry: Record) -> str:
     """A record as one line without its end: ``key`` and ``group`` first, then fields by name, none that is None."""
     first = {name: entry[name] for name in ("key", "group")}
     rest = {name: entry[name] for name in sorted(entry) if name not in first and entry[name] is not None}
     return json.dumps(first | rest, separators=(",", ":"), allow_nan=False)
 
 
-def head(group: str, **more: object) -> str:
+def format_head(group: str, **more: object) -> str:
     """Return the first line of a file or journal."""
-    return json.dumps({"format": FORMAT, "catalog": VERSION, "group": group, **more}, separators=(",", ":"))
+    return json.dumps(
+        {"format": JOURNAL_FORMAT_VERSION, "catalog": ARCHITECTURE_KEY_VERSION, "group": group, **more},
+        separators=(",", ":"),
+    )
 
 
 def read_head(text: str | bytes, file: str, otherwise: str, value: str | None, *needed: str) -> Mapping[str, Any]:
     """Read a file's first line; raises ``BadRequest`` for another version or no head."""
     try:
-        known = _loads(text)
+        known = _parse_json(text)
         versions, *_ = (known["format"], known["catalog"]), *(known[name] for name in needed)
     except (ValueError, TypeError, KeyError):
         raise BadRequest(f"{otherwise}: its first line is not a header", value, remedy=REBUILD) from None
@@ -95,9 +98,9 @@ def read_head(text: str | bytes, file: str, otherwise: str, value: str | None, *
     return dict(known)
 
 
-def _loads(text: str | bytes) -> Any:
+def _parse_json(text: str | bytes) -> Any:
     """Parse a line; raises ``ValueError`` also for one that is too long or nested too deeply."""
-    if len(text) > LARGEST_RECORD:
+    if len(text) > CATALOG_LINE_CHARACTERS_MAX:
         raise ValueError("too long")
     try:
         return json.loads(text)
@@ -105,12 +108,12 @@ def _loads(text: str | bytes) -> Any:
         raise ValueError("nested too deeply") from None
 
 
-def record(text: str, file: str | None = None) -> Record:
+def parse_record(text: str, file: str | None = None) -> Record:
     """The record of a line, each of its fields of the kind that all others rely on; raises ``BadRequest``, which names
     the file, where it is none."""
     try:
-        found = _loads(text)
-        wrong = _wrong_field(found) if isinstance(found, dict) else "a JSON object with a key"
+        found = _parse_json(text)
+        wrong = _find_wrong_field(found) if isinstance(found, dict) else "a JSON object with a key"
     except ValueError:
         wrong = "a JSON object with a key"
     if wrong:
@@ -120,7 +123,7 @@ def record(text: str, file: str | None = None) -> Record:
     return dict(found)
 
 
-def _wrong_field(found: dict[str, Any]) -> str:
+def _find_wrong_field(found: dict[str, Any]) -> str:
     """Return the first defect of an entry, empty if there is none."""
     for name in ("key", "group", *(() if "refused" in found else NEEDED)):
         if name not in found:
@@ -130,11 +133,11 @@ def _wrong_field(found: dict[str, Any]) -> str:
             if name in found and type(found[name]) is not kind:
                 return f"{name}: {said}"
     for name in LISTS:
-        if not _are(found.get(name, []), str):
+        if not _is_list_of(found.get(name, []), str):
             return f"{name}: a list of texts"
-    if not (_are(legs := found.get("minimal", []), list) and all(_are(each, str) for each in legs)):
+    if not (_is_list_of(legs := found.get("minimal", []), list) and all(_is_list_of(each, str) for each in legs)):
         return "minimal: a list of lists of texts"
-    if not (_are(choices := found.get("choices", []), dict) and all(map(_is_choice, choices))):
+    if not (_is_list_of(choices := found.get("choices", []), dict) and all(map(_is_choice, choices))):
         return "choices: a list of objects with joints and rank"
     for name in found.keys() - {*LISTS, "minimal", "choices"}:
         if isinstance(found[name], list | dict):
@@ -144,7 +147,7 @@ def _wrong_field(found: dict[str, Any]) -> str:
     return ""
 
 
-def _are(values: Any, kind: type) -> bool:
+def _is_list_of(values: Any, kind: type) -> bool:
     """Return True for a list of values of a kind."""
     return type(values) is list and all(type(each) is kind for each in values)
 
@@ -153,43 +156,43 @@ def _is_choice(each: dict[str, Any]) -> bool:
     legs: Any = each.get("joints")
     return (
         type(each.get("rank")) is int
-        and _are(legs, list)
+        and _is_list_of(legs, list)
         and legs != []
-        and all(_are(joints, int) for joints in legs)
+        and all(_is_list_of(joints, int) for joints in legs)
         and not any(isinstance(value, list | dict) for name, value in each.items() if name != "joints")
     )
 
 
-def word_of(text: str, file: str | None = None) -> str:
+def parse_word(text: str, file: str | None = None) -> str:
     """The word of a record's line."""
-    return str(record(text, file)["key"])
+    return str(parse_record(text, file)["key"])
 
 
 def is_written(text: str) -> bool:
-    """Return True if a line has the form of :func:`line`, without escapes."""
+    """Return True if a line has the form of :func:`get_line`, without escapes."""
     return text.startswith(LINE_START) and _GROUP in text and '": ' not in text and "\\u" not in text
 
 
-def leading_word(text: str, file: str | None = None) -> str:
-    """The word with which a line begins that :func:`line` wrote, else that of its record."""
+def read_leading_word(text: str, file: str | None = None) -> str:
+    """The word with which a line begins that :func:`get_line` wrote, else that of its record."""
     end = text.find('"', len(LINE_START)) if text.startswith(LINE_START) else -1
-    return text[len(LINE_START) : end] if end > 0 else word_of(text, file)
+    return text[len(LINE_START) : end] if end > 0 else parse_word(text, file)
 
 
 def encode_lines(group: str, lines: Iterable[str], *, checksum: bool = True) -> bytes:
     """The bytes of a group's file, sorted by word, whatever the order of the lines; their ``checksum`` stands in the
     head, but for a file that is packed: gzip has its own."""
-    ordered = sorted(lines, key=leading_word)
+    ordered = sorted(lines, key=read_leading_word)
     content = "".join(f"{each}\n" for each in ordered).encode("ascii")
-    crc = {CHECKSUM: _checksum(content)} if checksum else {}
-    return head(group, count=len(ordered), **crc).encode("ascii") + b"\n" + content
+    crc = {CHECKSUM: _compute_checksum(content)} if checksum else {}
+    return format_head(group, count=len(ordered), **crc).encode("ascii") + b"\n" + content
 
 
-def _checksum(content: bytes) -> str:
+def _compute_checksum(content: bytes) -> str:
     return f"{zlib.crc32(content):08x}"
 
 
-def head_count(first: bytes, file: str) -> int:
+def read_head_count(first: bytes, file: str) -> int:
     """Return the number of entries in a file's first line; raises ``BadRequest`` without one."""
     return int(_read_count(first, file)["count"])
 
@@ -206,19 +209,19 @@ def decode_lines(content: bytes, file: str) -> list[str]:
     something else."""
     first, _, rest = content.partition(b"\n")
     told, found = _read_count(first, file), rest.count(b"\n")
-    if CHECKSUM in told and told[CHECKSUM] != (crc := _checksum(rest)) and found >= told["count"]:
+    if CHECKSUM in told and told[CHECKSUM] != (crc := _compute_checksum(rest)) and found >= told["count"]:
         raise BadRequest(f"{file}: damaged, checksum", crc, str(told[CHECKSUM]), remedy=REBUILD)
     if found != told["count"] or not content.endswith(b"\n"):
         raise BadRequest(f"{file}: truncated, entries", found, str(told["count"]), remedy=REBUILD)
     return rest.decode("ascii", "replace").split("\n")[:-1]
 
 
-def require_version(found: tuple[object, object], file: str, wanted: int = FORMAT) -> None:
+def require_version(found: tuple[object, object], file: str, wanted: int = JOURNAL_FORMAT_VERSION) -> None:
     """Raise ``BadRequest`` where a file is of another version of the format than ``wanted`` or of the catalog."""
-    if found != (wanted, VERSION):
+    if found != (wanted, ARCHITECTURE_KEY_VERSION):
         raise BadRequest(
             f"{file}: a catalog of another version",
             "format {}, keys {}".format(*found),
-            f"format {wanted}, keys {VERSION}",
+            f"format {wanted}, keys {ARCHITECTURE_KEY_VERSION}",
             remedy=REBUILD,
         )

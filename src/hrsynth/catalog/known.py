@@ -13,47 +13,53 @@ from .jsonl import Record
 
 
 @cache
-def aliases() -> dict[str, str]:
+def list_aliases() -> dict[str, str]:
     """Return names by key, without motors and marks of observed links."""
     text = resources.files("hrsynth.catalog").joinpath("aliases.toml").read_text(encoding="utf-8")
     return {word: each["names"] for each in tomllib.loads(text)["robot"] for word in each["words"]}
 
 
 @cache
-def alias(word: str) -> str | None:
+def find_alias(word: str) -> str | None:
     """Under which names a word's robot is known."""
-    return aliases().get(bare(word))
+    return list_aliases().get(strip_marks(word))
 
 
 @cache
-def kinds_called(text: str) -> frozenset[frozenset[str]]:
+def find_named_kinds(text: str) -> frozenset[frozenset[str]]:
     """The kinds of legs, without motors and marks, of robots in whose names a text occurs."""
-    return frozenset(kinds(word) for word, names in aliases().items() if text.casefold() in names.casefold())
+    return frozenset(
+        list_leg_kinds(word) for word, names in list_aliases().items() if text.casefold() in names.casefold()
+    )
 
 
-def kinds(word: str) -> frozenset[str]:
+def list_leg_kinds(word: str) -> frozenset[str]:
     """Return the legs of a key, without motors and marks of observed links, each once."""
     return frozenset(re.findall(r"\(([^()]*)\)", re.sub("[*!]", "", word)))
 
 
-def equal_legs(word: str) -> bool:
+def has_equal_legs(word: str) -> bool:
     """Return True if all legs of a key have one chain, regardless of motors and observed links."""
-    return len(kinds(word)) < 2
+    return len(list_leg_kinds(word)) < 2
 
 
 def is_called(record: Record, text: str) -> bool:
     """Return True if a text occurs in a name of an entry's robot; keys with other legs are not parsed."""
-    found = kinds_called(text)
-    return bool(found) and kinds(record["key"]) in found and text.casefold() in known_as(record).casefold()
+    found = find_named_kinds(text)
+    return (
+        bool(found)
+        and list_leg_kinds(record["key"]) in found
+        and text.casefold() in list_known_names(record).casefold()
+    )
 
 
-def known_as(record: Record) -> str:
+def list_known_names(record: Record) -> str:
     """The names under which a record's robot is known; words with legs that no known robot has are not read."""
     word = record["key"]
-    return (alias(word) or "") if kinds(word) in kinds_called("") else ""
+    return (find_alias(word) or "") if list_leg_kinds(word) in find_named_kinds("") else ""
 
 
-def bare(word: str) -> str:
+def strip_marks(word: str) -> str:
     """Return a key without motors and marks of observed links."""
     return str(parse(word).unmoved.unmarked)
 
@@ -64,7 +70,7 @@ def order(record: Record) -> tuple[bool, bool, bool, bool, bool, bool]:
     word = record["key"]
     legs = len(set(parse(word).legs))
     return (
-        alias(word) is None,
+        find_alias(word) is None,
         "refused" in record,
         legs > 1,
         "!" in word,

@@ -11,14 +11,14 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
-from ..budgets import MOST_READ_PARTS
+from ..budgets import CATALOG_JSON_PARTS_MAX
 from ..errors import BadRequest
 from ..results import Value
 from .architecture_key import SENSORS, parse
-from .conditions import places, require_askable
-from .jsonl import Record, leading_word, record
-from .known import alias, is_called, order
-from .store import DATABASES, ShippedCatalogs, Store, shipped_folder, store
+from .conditions import list_matching_lines, require_askable
+from .jsonl import Record, parse_record, read_leading_word
+from .known import find_alias, is_called, order
+from .store import DATABASES, ShippedCatalogs, Store, locate_shipped_folder, store
 
 
 class ReadRecords(Sequence[Record]):
@@ -34,12 +34,12 @@ class ReadRecords(Sequence[Record]):
 
     def fitting(self, asked: Mapping[str, Any]) -> ReadRecords:
         """Return the entries that fit criteria."""
-        found = places(self._lines, asked, partial(record, file=self._source))
+        found = list_matching_lines(self._lines, asked, partial(parse_record, file=self._source))
         return ReadRecords([self._lines[i] for i in found], self._source)
 
     def words(self) -> list[str]:
         """Return the keys of all entries without parsing them."""
-        return [leading_word(each, self._source) for each in self._lines]
+        return [read_leading_word(each, self._source) for each in self._lines]
 
     def __getitem__(self, place: Any) -> Any:
         if isinstance(place, slice):
@@ -48,12 +48,12 @@ class ReadRecords(Sequence[Record]):
         if found is None:
             line = self._lines[place]
             self._parts += 3 + sum(map(line.count, "[{,"))
-            if self._parts > MOST_READ_PARTS:
+            if self._parts > CATALOG_JSON_PARTS_MAX:
                 raise BadRequest(
-                    f"{self._source or 'catalog'}: more than {MOST_READ_PARTS} JSON values",
+                    f"{self._source or 'catalog'}: more than {CATALOG_JSON_PARTS_MAX} JSON values",
                     remedy="Restrict the search, for example by group.",
                 )
-            found = self._read[place] = record(line, self._source)
+            found = self._read[place] = parse_record(line, self._source)
         return found
 
 
@@ -112,7 +112,7 @@ class Catalog(Value):
         if isinstance(self.records, ReadRecords):
             return Catalog(self.records.fitting(asked))
         lines = [json.dumps(dict(each), separators=(",", ":"), default=str) for each in self.records]
-        return Catalog([self.records[i] for i in places(lines, asked, json.loads)])
+        return Catalog([self.records[i] for i in list_matching_lines(lines, asked, json.loads)])
 
     @property
     def words(self) -> list[str]:
@@ -169,8 +169,8 @@ def load(path: str | Path | None = None, **asked: Any) -> Catalog:
     'controllable'
     """
     require_askable(asked)
-    kept = _there(path)
-    groups = _groups(kept, asked)
+    kept = _open_store(path)
+    groups = _choose_groups(kept, asked)
     return Catalog(ReadRecords(kept.lines(groups, asked), str(kept.path)))
 
 
@@ -180,46 +180,47 @@ def find_named(text: str, path: str | Path | None = None) -> list[Record]:
     called = (each for each in load(path, text=text) if is_called(each, text))
     found = {each["key"]: each for each in (*called, *load(path, legs=text))}.values()
     starts = f", {text}".casefold()
-    return sorted(found, key=lambda each: (starts not in f", {alias(each['key'])}".casefold(), *order(each)))
+    return sorted(found, key=lambda each: (starts not in f", {find_alias(each['key'])}".casefold(), *order(each)))
 
 
 def count(path: str | Path | None = None, **asked: Any) -> int:
     """Count the entries of the groups that are searched for criteria."""
-    return sum(map(_there(path).count, covered(path, **asked)))
+    return sum(map(_open_store(path).count, list_covered_groups(path, **asked)))
 
 
-def covered(path: str | Path | None = None, **asked: Any) -> list[str]:
+def list_covered_groups(path: str | Path | None = None, **asked: Any) -> list[str]:
     """Return the names of the groups that are searched for criteria."""
-    return _groups(_there(path), asked if asked.get("group") == SENSORS else {**asked, "group": None})
+    return _choose_groups(_open_store(path), asked if asked.get("group") == SENSORS else {**asked, "group": None})
 
 
-def groups_of(path: str | Path | None = None) -> list[str]:
+def list_groups(path: str | Path | None = None) -> list[str]:
     """Return the names of the stored groups."""
-    return _there(path).groups()
+    return _open_store(path).groups()
 
 
-def values(name: str, path: str | Path | None = None) -> list[Any]:
+def list_field_values(name: str, path: str | Path | None = None) -> list[Any]:
     """Return the values of a field, one of ``FIELDS``, in the entries of all groups, sorted."""
-    return _there(path).values(name)
+    return _open_store(path).values(name)
 
 
-def _groups(kept: Store, asked: Mapping[str, Any]) -> list[str]:
+def _choose_groups(kept: Store, asked: Mapping[str, Any]) -> list[str]:
     """Return the groups that are searched for criteria."""
     wanted = asked.get("group")
     return [
         name
         for name in kept.groups()
-        if name in _tuple(wanted) or (wanted is None and (name == SENSORS) == (asked.get("sensor") is not None))
+        if name in _convert_to_tuple(wanted)
+        or (wanted is None and (name == SENSORS) == (asked.get("sensor") is not None))
     ]
 
 
-def _tuple(value: object) -> tuple[object, ...]:
+def _convert_to_tuple(value: object) -> tuple[object, ...]:
     return value if isinstance(value, tuple) else (value,)
 
 
-def _there(path: str | Path | None) -> Store:
+def _open_store(path: str | Path | None) -> Store:
     """Return the store of a path, by default the shipped one; raises ``BadRequest`` if there is none."""
-    kept = shipped_folder() if path is None else store(path)
+    kept = locate_shipped_folder() if path is None else store(path)
     if path is not None and not kept.path.exists() and not isinstance(kept, ShippedCatalogs):
         raise BadRequest(
             f"--catalog {path}: not found", remedy=f"Name a folder or a file that ends in {', '.join(DATABASES)}."

@@ -14,22 +14,31 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from ..budgets import LARGEST_CATALOG, LARGEST_RECORD, MOST_RECORDS
-from ..description.files import open_regular, replacement
-from ..errors import BadRequest, BuildStopped
-from ..untrusted import gunzip
-from .architecture_key import VERSION
-from .conditions import RecordQuestion, fill, places
+from ..budgets import CATALOG_ENTRIES_MAX, CATALOG_LINE_CHARACTERS_MAX, CATALOG_MAX_BYTES
+from ..description.files import open_regular, open_replacement
+from ..errors import BadRequest, BuildInterruption
+from ..untrusted import unpack_gzip
+from .architecture_key import ARCHITECTURE_KEY_VERSION
+from .conditions import RecordQuestion, fill, list_matching_lines
 from .journal import ENDING, Journal
-from .jsonl import FLAGS, REBUILD, decode_lines, encode_lines, head_count, leading_word, record, require_version
+from .jsonl import (
+    FLAGS,
+    REBUILD,
+    decode_lines,
+    encode_lines,
+    parse_record,
+    read_head_count,
+    read_leading_word,
+    require_version,
+)
 
 DATABASES = (".sqlite", ".sqlite3", ".db")
 """Extensions of a SQLite store."""
 LINES, PACKED = ".jsonl", ".jsonl.gz"
 """Extensions of the files of a folder."""
-TABLES = 3
+SQLITE_TABLES_VERSION = 3
 """Version of the tables of a SQLite file."""
-PACKED_ABOVE = 5_000
+UNCOMPRESSED_ENTRIES_MAX = 5_000
 """Records of a group above which its file is compressed, where it may unpack to so much."""
 PUBLISHED = "published"
 """The shipped catalog of published robots."""
@@ -62,56 +71,56 @@ class Folder:
             size += len(content)
             _require_small(size, self.path)
             found += decode_lines(content, str(self.file(group)))
-        return [found[i] for i in places(found, asked, partial(record, file=str(self.path)))]
+        return [found[i] for i in list_matching_lines(found, asked, partial(parse_record, file=str(self.path)))]
 
     def content(self, group: str) -> bytes:
         """The bytes of a group's lines; raises ``BadRequest`` where they cannot be read."""
-        file, content = self._bytes(group, LARGEST_CATALOG + 1)
-        if len(content) > LARGEST_CATALOG:
-            raise BadRequest(f"{file}: more than {LARGEST_CATALOG} bytes", remedy="Build a .sqlite file.")
+        file, content = self._bytes(group, CATALOG_MAX_BYTES + 1)
+        if len(content) > CATALOG_MAX_BYTES:
+            raise BadRequest(f"{file}: more than {CATALOG_MAX_BYTES} bytes", remedy="Build a .sqlite file.")
         if not file.name.endswith(PACKED):
             return content
-        content = gunzip(content, file, LARGEST_CATALOG)
-        if (count := content.count(b"\n")) > MOST_RECORDS:
-            raise BadRequest(f"{file}: lines", count, f"at most {MOST_RECORDS}", remedy="Build a .sqlite file.")
+        content = unpack_gzip(content, file, CATALOG_MAX_BYTES)
+        if (count := content.count(b"\n")) > CATALOG_ENTRIES_MAX:
+            raise BadRequest(f"{file}: lines", count, f"at most {CATALOG_ENTRIES_MAX}", remedy="Build a .sqlite file.")
         return content
 
     def _bytes(self, group: str, most: int) -> tuple[Path, bytes]:
         """A group's file, and so many of its bytes at most."""
         file = self.file(group)
-        with _readable(file), open_regular(file) as stream:
+        with _require_readable(file), open_regular(file) as stream:
             return file, stream.read(most)
 
     def count(self, group: str) -> int:
         """Return the number of lines of a group."""
-        file, content = self._bytes(group, LARGEST_RECORD)
+        file, content = self._bytes(group, CATALOG_LINE_CHARACTERS_MAX)
         if file.name.endswith(PACKED):
             with contextlib.suppress(zlib.error):
-                content = zlib.decompressobj(wbits=31).decompress(content, LARGEST_RECORD)
-        return head_count(content.partition(b"\n")[0], str(file))
+                content = zlib.decompressobj(wbits=31).decompress(content, CATALOG_LINE_CHARACTERS_MAX)
+        return read_head_count(content.partition(b"\n")[0], str(file))
 
     def values(self, name: str) -> list[Any]:
         """The values of a field that records have, one of ``FIELDS``, each once, sorted."""
-        records = (record(line, str(self.path)) for line in self.lines(self.groups(), {}))
+        records = (parse_record(line, str(self.path)) for line in self.lines(self.groups(), {}))
         return sorted({value for each in records if (value := each.get(name)) is not None})
 
     def write(self, group: str, lines: Iterable[str]) -> None:
         """Replace a group."""
         lines = list(lines)
         plain, packed = (self.path / f"{group}{ending}" for ending in (LINES, PACKED))
-        large = PACKED_ABOVE < len(lines) < MOST_RECORDS
+        large = UNCOMPRESSED_ENTRIES_MAX < len(lines) < CATALOG_ENTRIES_MAX
         content = encode_lines(group, lines, checksum=not large)
-        if len(content) > LARGEST_CATALOG:
-            text = f"{self.path / group}: {len(content)} bytes, more than {LARGEST_CATALOG}"
+        if len(content) > CATALOG_MAX_BYTES:
+            text = f"{self.path / group}: {len(content)} bytes, more than {CATALOG_MAX_BYTES}"
             raise BadRequest(text, remedy="Build a .sqlite file.")
         file, other = (packed, plain) if large else (plain, packed)
-        with writable(file), replacement(file, sync=True) as draft:
+        with require_writable(file), open_replacement(file, sync=True) as draft:
             draft.write_bytes(gzip.compress(content, mtime=0) if large else content)
         other.unlink(missing_ok=True)
 
     def journal(self, group: str, *, anew: bool = False) -> Journal:
         """The journal of a group's build, beside the store."""
-        with writable(self.path):
+        with require_writable(self.path):
             self.path.mkdir(exist_ok=True)
         return _open_journal(self.path / f"{group}{LINES}", f"{group}{LINES}", group, anew)
 
@@ -150,7 +159,7 @@ class Database:
 
     def lines(self, groups: Sequence[str], asked: Mapping[str, Any]) -> Sequence[str]:
         question = RecordQuestion.of(("group", tuple(groups)), *asked.items())
-        with _refusing_sqlite_errors(self.path):
+        with _refuse_sqlite_errors(self.path):
             file = self._open()
             counted = "sum(count), (SELECT max(record) FROM records), (SELECT max(record) FROM lines)"
             if len(set(file.execute(f"SELECT {counted} FROM groups").fetchone())) > 1:
@@ -169,11 +178,11 @@ class Database:
 
     def write(self, group: str, lines: Iterable[str]) -> None:
         others = [name for name in self.groups() if name != group] if self.path.exists() else []
-        with writable(self.path), replacement(self.path, sync=True) as draft:
+        with require_writable(self.path), open_replacement(self.path, sync=True) as draft:
             try:
                 write_tables(draft, {**{name: self.lines([name], {}) for name in others}, group: lines})
             except sqlite3.Error as error:
-                raise BuildStopped(f"{self.path}: {error}") from None
+                raise BuildInterruption(f"{self.path}: {error}") from None
 
     def journal(self, group: str, *, anew: bool = False) -> Journal:
         if self.path.exists():
@@ -185,23 +194,23 @@ class Database:
 
     def _column(self, asked: str, *values: object) -> list[Any]:
         """Return the values of one column; raises ``BadRequest`` for another file or version."""
-        with _refusing_sqlite_errors(self.path), contextlib.closing(self._open()) as file:
+        with _refuse_sqlite_errors(self.path), contextlib.closing(self._open()) as file:
             return [value for (value,) in file.execute(asked, values)]
 
     def _open(self) -> sqlite3.Connection:
         """The file to read, where it holds no more than tables: views and triggers are programs."""
-        with _readable(self.path), open_regular(self.path) as stream:
+        with _require_readable(self.path), open_regular(self.path) as stream:
             head = stream.read(20)
         if b"\2" in head[18:]:
             raise BadRequest(f"{self.path}: not a catalog file: it has a write-ahead log", remedy=REBUILD)
         file = sqlite3.connect(f"{self.path.absolute().as_uri()}?mode=ro", uri=True, check_same_thread=False)
-        file.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_RECORD)
+        file.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, CATALOG_LINE_CHARACTERS_MAX)
         file.execute("PRAGMA trusted_schema = OFF")
         for name, made in file.execute("SELECT name, sql FROM sqlite_master WHERE sql IS NOT NULL"):
             if not _PLAIN.match(str(made)):
                 raise BadRequest(f"{self.path}: not a catalog file", name, "plain tables", remedy=REBUILD)
         found = file.execute("SELECT format, catalog FROM versions").fetchone() or (None, None)
-        require_version(found, str(self.path), TABLES)
+        require_version(found, str(self.path), SQLITE_TABLES_VERSION)
         return file
 
 
@@ -223,7 +232,7 @@ class StoredLines(Sequence[str]):
             return [self[i] for i in range(*place.indices(len(self)))]
         row = self._rows[place]
         if row not in self._read:
-            with _refusing_sqlite_errors(self._path):
+            with _refuse_sqlite_errors(self._path):
                 (line,) = self._file.execute("SELECT line FROM lines WHERE record = ?", (row,)).fetchone() or (None,)
             if not isinstance(line, str):
                 raise BadRequest(f"{self._path}: not a catalog file: rows without a line", remedy=REBUILD)
@@ -235,8 +244,8 @@ class StoredLines(Sequence[str]):
 
 def _require_small(size: int, file: Path) -> None:
     """Raise ``BadRequest`` for lines that are larger together than may be read."""
-    if size > LARGEST_CATALOG:
-        raise BadRequest(f"{file}: lines of more than {LARGEST_CATALOG} bytes", remedy="Restrict the search.")
+    if size > CATALOG_MAX_BYTES:
+        raise BadRequest(f"{file}: lines of more than {CATALOG_MAX_BYTES} bytes", remedy="Restrict the search.")
 
 
 def store(path: str | Path) -> Store:
@@ -244,13 +253,13 @@ def store(path: str | Path) -> Store:
     package, unless there is such a folder."""
     path = Path(path)
     if path == Path(ALL) and not path.exists():
-        return ShippedCatalogs(shipped_folder().path)
+        return ShippedCatalogs(locate_shipped_folder().path)
     if path == Path(PUBLISHED) and not path.exists():
-        return Folder(shipped_folder().path / PUBLISHED)
+        return Folder(locate_shipped_folder().path / PUBLISHED)
     return Database(path) if path.suffix in DATABASES else Folder(path)
 
 
-def shipped_folder() -> Folder:
+def locate_shipped_folder() -> Folder:
     """The catalog that comes with the package."""
     packaged = Path(str(resources.files("hrsynth").joinpath("catalog", "shipped")))
     return Folder(packaged if packaged.is_dir() else Path(__file__).parents[3] / "catalog")
@@ -265,7 +274,7 @@ def _open_journal(file: Path, name: str, group: str, anew: bool) -> Journal:
 
 
 @contextlib.contextmanager
-def _refusing_sqlite_errors(file: Path) -> Iterator[None]:
+def _refuse_sqlite_errors(file: Path) -> Iterator[None]:
     """Raise ``BadRequest`` for an error of SQLite."""
     try:
         yield
@@ -274,7 +283,7 @@ def _refusing_sqlite_errors(file: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _readable(file: Path) -> Iterator[None]:
+def _require_readable(file: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
@@ -282,24 +291,24 @@ def _readable(file: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def writable(file: Path, what: str = "catalog") -> Iterator[None]:
+def require_writable(file: Path, what: str = "catalog") -> Iterator[None]:
     """A disk that is full stops a build, anything else is a bad request."""
     try:
         yield
     except OSError as error:
         if error.errno in FULL:
-            raise BuildStopped(f"{file}: {error.strerror}") from None
+            raise BuildInterruption(f"{file}: {error.strerror}") from None
         raise BadRequest(f"{file}: cannot write the {what}: {error.strerror}", remedy="Choose another path.") from None
 
 
 def write_tables(path: Path, groups: Mapping[str, Iterable[str]]) -> None:
     """Write a new file: the same bytes for the same lines."""
-    lines = [line for _, group in sorted(groups.items()) for line in sorted(group, key=leading_word)]
+    lines = [line for _, group in sorted(groups.items()) for line in sorted(group, key=read_leading_word)]
     with contextlib.closing(sqlite3.connect(path)) as file:
         file.execute("PRAGMA journal_mode = OFF")
-        file.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_RECORD)
+        file.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, CATALOG_LINE_CHARACTERS_MAX)
         file.execute("CREATE TABLE versions (format INTEGER, catalog INTEGER)")
-        file.execute("INSERT INTO versions VALUES (?, ?)", (TABLES, VERSION))
+        file.execute("INSERT INTO versions VALUES (?, ?)", (SQLITE_TABLES_VERSION, ARCHITECTURE_KEY_VERSION))
         fill(file, lines)
         file.execute("CREATE TABLE groups (name, count)")
         file.execute('INSERT INTO groups SELECT "group", count(*) FROM records GROUP BY 1')

@@ -11,17 +11,17 @@ from typing import Any
 from ..analysis.aspects.path import PathAnswer
 from ..analysis.derive import Derivation
 from ..analysis.modes.modes import AssemblyModes
-from ..budgets import VERIFY_SECONDS
+from ..budgets import VERIFY_TIMEOUT_S
 from ..description import load
-from ..description.files import as_path, open_regular
-from ..errors import BadRequest, CertificateRefused, NoCertificate, PoseNotReached
+from ..description.files import convert_to_path, open_regular
+from ..errors import BadRequest, InvalidCertificate, NoCertificate, PoseReachFailure
 from ..mechanism import Mechanism
-from ..tolerances import SAME_RELATION
-from ..untrusted import output
+from ..tolerances import RELATION_ANGLE_TOL
+from ..untrusted import run_program
 from . import modes, paths, ranks, verify_certificate, verify_path, verify_ranks
-from .verify_certificate import NotAccepted, once, rational
-from .verify_path import PathNotAccepted
-from .verify_ranks import RanksNotAccepted
+from .verify_certificate import CertificateRejection, once, rational
+from .verify_path import PathRejection
+from .verify_ranks import RankRejection
 
 
 def certificate(found: AssemblyModes | Derivation | PathAnswer) -> dict[str, Any]:
@@ -84,7 +84,7 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
 
     Raises
     ------
-    CertificateRefused
+    InvalidCertificate
         If the certificate is not accepted.
     BadRequest
         If the file is not readable.
@@ -97,7 +97,7 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
     if isinstance(source, Mapping):
         record, name, file = dict(source), "the certificate", None
     else:
-        name = str(file := as_path(source))
+        name = str(file := convert_to_path(source))
         try:
             with open_regular(file) as content:
                 text = content.read(verify_certificate.LENGTH + 1).decode()
@@ -107,8 +107,8 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
                     remedy="Use a file that --certificate wrote.",
                 )
             record = json.loads(text, object_pairs_hook=once)
-        except NotAccepted as reason:
-            raise CertificateRefused(name, str(reason)) from None
+        except CertificateRejection as reason:
+            raise InvalidCertificate(name, str(reason)) from None
         except (OSError, ValueError, RecursionError) as error:
             why = getattr(error, "strerror", None) or "not JSON"
             raise BadRequest(
@@ -117,46 +117,46 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
             ) from None
     try:
         if not isinstance(record, dict):
-            raise NotAccepted("it is not a JSON object")
+            raise CertificateRejection("it is not a JSON object")
         checkers = {"path": verify_path, "ranks": verify_ranks}
         checker = checkers.get(str(record.get("claim")), verify_certificate)
         proved = checker.verify(record) if file is None else _within_limits(Path(str(checker.__file__)), file)
-    except (NotAccepted, PathNotAccepted, RanksNotAccepted, BadRequest) as reason:
-        raise CertificateRefused(name, str(reason)) from None
+    except (CertificateRejection, PathRejection, RankRejection, BadRequest) as reason:
+        raise InvalidCertificate(name, str(reason)) from None
     if robot is not None:
         robot = load(robot)
         try:
             own = {"modes": modes, "ranks": ranks, "path": paths}[record["claim"]].again(record, robot)
-        except (BadRequest, NoCertificate, PoseNotReached) as error:
-            raise CertificateRefused(name, f"it is not for {robot.name}: {error}") from None
+        except (BadRequest, NoCertificate, PoseReachFailure) as error:
+            raise InvalidCertificate(name, f"it is not for {robot.name}: {error}") from None
         except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
-            raise CertificateRefused(name, f"it does not name the legs and pose of its claim ({error!r})") from None
-        if not _same(record, own):
-            raise CertificateRefused(name, f"it is not for {robot.name}: other geometry, legs or pose")
+            raise InvalidCertificate(name, f"it does not name the legs and pose of its claim ({error!r})") from None
+        if not _is_same_geometry(record, own):
+            raise InvalidCertificate(name, f"it is not for {robot.name}: other geometry, legs or pose")
     return f"{proved}{ranks.describe_ranks(record)}" if record["claim"] == "ranks" else proved
 
 
 def _within_limits(checker: Path, file: Path) -> str:
-    """Run the checker on a file, in a process of its own; raises ``NotAccepted``, ``BadRequest``."""
-    verdict, _, said = output(checker, str(file), seconds=VERIFY_SECONDS).decode().strip().partition(": ")
+    """Run the checker on a file, in a process of its own; raises ``CertificateRejection``, ``BadRequest``."""
+    verdict, _, said = run_program(checker, str(file), seconds=VERIFY_TIMEOUT_S).decode().strip().partition(": ")
     if verdict != "accepted":
-        raise NotAccepted(said)
+        raise CertificateRejection(said)
     return said
 
 
-def _same(one: Any, other: Any) -> bool:
+def _is_same_geometry(one: Any, other: Any) -> bool:
     """Return True if two records of geometry agree; solutions are left out."""
     if isinstance(one, dict) and isinstance(other, dict):
         left_out = {"robot", "boxes", "bound", "sha256", "stacks", "path"}
         return one.keys() - left_out == other.keys() - left_out and all(
-            _same(one[key], other[key]) for key in one.keys() - left_out
+            _is_same_geometry(one[key], other[key]) for key in one.keys() - left_out
         )
     if isinstance(one, list) and isinstance(other, list):
-        return len(one) == len(other) and all(map(_same, one, other))
+        return len(one) == len(other) and all(map(_is_same_geometry, one, other))
     try:
         if one == other:
             return True
         x, y = (rational(each) if isinstance(each, str) else Fraction(each) for each in (one, other))
-        return abs(x - y) < SAME_RELATION
-    except (TypeError, ValueError, ArithmeticError, NotAccepted):
+        return abs(x - y) < RELATION_ANGLE_TOL
+    except (TypeError, ValueError, ArithmeticError, CertificateRejection):
         return False

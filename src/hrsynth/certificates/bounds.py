@@ -10,25 +10,25 @@ from typing import Any
 
 from ..analysis.modes.planar_loops import groupings, unknowns
 from .refining import Polynomial
-from .verify_certificate import PRIME, NotAccepted, degrees, multiples, poses, rank
+from .verify_certificate import PRIME, CertificateRejection, degrees, multiples, poses, rank
 
-CAPS = 6
+MONOMIAL_CAP_MAX = 6
 """Largest cap of the monomials of a rank bound."""
 COLUMNS, UNKNOWNS = 220, 4
 """The largest number of monomials, and of unknowns."""
-PATIENCE = 3
+BOUND_TRIES_WITHOUT_GAIN_MAX = 3
 """After so many bounds that are no better the search for one ends."""
-ABOVE = 2
+MULTIPLES_ABOVE_CAP_MAX = 2
 """By how much multiples go beyond the caps at most, where zeros lie at infinity."""
 
 
 def bound(record: dict[str, Any], equations: Sequence[Polynomial], halves: Sequence[bool]) -> dict[str, Any]:
-    """The first bound of the checker that is the number of boxes; raises ``NotAccepted``."""
+    """The first bound of the checker that is the number of boxes; raises ``CertificateRejection``."""
     count, least = len(record["boxes"]), math.inf
     if record["kind"] == "pose":
         if poses(equations, halves, record) == count:
             return {"kind": "poses"}
-        raise NotAccepted(f"{count} solutions are enclosed, but the checker cannot exclude more")
+        raise CertificateRejection(f"{count} solutions are enclosed, but the checker cannot exclude more")
     if record["kind"] == "loops":
         loops = [unknowns(((slide, turns) for _, slide, turns in loop), record["angles"]) for loop in record["loops"]]
         for grouping in groupings(record["angles"], record["slides"], loops):
@@ -36,7 +36,7 @@ def bound(record: dict[str, Any], equations: Sequence[Polynomial], halves: Seque
                 least = min(least, int(degrees(equations, halves, record | {"bound": {"groups": grouping}})))
             if least == count:
                 return {"kind": "degrees", "groups": grouping}
-    for most in (0, ABOVE) if len(halves) <= UNKNOWNS else ():
+    for most in (0, MULTIPLES_ABOVE_CAP_MAX) if len(halves) <= UNKNOWNS else ():
         best, worse = math.inf, 0
         for groups in _groups(halves, most):
             found = _most(equations, halves, groups)
@@ -45,10 +45,10 @@ def bound(record: dict[str, Any], equations: Sequence[Polynomial], halves: Seque
             if found < math.inf:
                 worse = 0 if found < best else worse + 1
                 best = min(best, found)
-            if worse == PATIENCE:
+            if worse == BOUND_TRIES_WITHOUT_GAIN_MAX:
                 break
         least = min(least, best)
-    raise NotAccepted(
+    raise CertificateRejection(
         f"{count} solutions are enclosed, but "
         + (f"there may be {least}" if least < math.inf else "no bound of their number is known")
     )
@@ -59,7 +59,7 @@ def _groups(halves: Sequence[bool], most: int) -> Iterator[list[list[Any]]]:
     where ``most`` is zero."""
     n = len(halves)
     groups = [*filter(None, [[k for k in range(n) if not halves[k]], *([k] for k in range(n) if halves[k])])]
-    choices = [(cap, more) for cap in range(1, CAPS + 1) for more in range(most + 1)]
+    choices = [(cap, more) for cap in range(1, MONOMIAL_CAP_MAX + 1) for more in range(most + 1)]
     for chosen in sorted(product(choices, repeat=len(groups)), key=lambda each: (sum(map(sum, each)), each)):
         size = math.prod(
             math.comb(len(group) + cap + more, len(group)) for group, (cap, more) in zip(groups, chosen, strict=True)

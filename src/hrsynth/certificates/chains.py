@@ -24,19 +24,19 @@ from ..analysis.modes.single_loop import SingleLoop, dual_product
 from ..geometry.vectors import Array
 from .closures import write_numbers
 from .refining import Polynomial
-from .verify_certificate import KINDS, NotAccepted, cross, dot, integral, rational, slope
+from .verify_certificate import KINDS, CertificateRejection, cross, dot, integral, rational, slope
 
 PLATFORM = [["0", "0", "0"], ["1", "0", "0"], ["0", "1", "0"]]
 """Three points of the platform at the goal (sizes)."""
-REST = 2
+DEPENDENT_LOOP_JOINTS_COUNT = 2
 """Joints of a loop without unknowns."""
-STEPS = 1024
+NORMAL_DENOMINATOR_COUNT = 1024
 """How finely normals are turned to be at right angles."""
 STARTS, SETS, ITERATIONS = 64, 20, 60
 """Random starts at once, how often, and Newton's steps from them."""
 REACHED, SAME = 1e-10, 1e-6
 """The last of Newton's steps at a solution, and how far two proposals of one are apart at most."""
-FROM = 0.6
+ZERO_TO_GOAL_OFFSET_RAD = 0.6
 """Rotation of the zero position of each next joint of a leg from the goal (rad)."""
 
 Starts = list[tuple[list[complex], bool | None]]
@@ -83,7 +83,7 @@ def chains(system: CarriedPlatform, found: Sequence[Array]) -> Iterator[ToldChai
         return
     joints, m = [_joint(each, np.eye(3), np.zeros(3)) for each in system.freedoms_], len(system.freedoms_)
     back = [[kind, [str(-Fraction(c)) for c in a], o] for kind, a, o in joints[::-1]]
-    n = max(1, m - REST)
+    n = max(1, m - DEPENDENT_LOOP_JOINTS_COUNT)
     for way, ends, q in ((joints, system.before, found), (back, m - system.before, [x[::-1] for x in found])):
         if 0 < ends <= n:
             record = _record(way, n, ends) | {"normals": _normals(way[n:])}
@@ -107,7 +107,7 @@ def _carried_chain(system: CarriedPlatform, found: Sequence[Array]) -> ToldChain
     goal, so that a half turn from there, as observed directions allow, is not an infinite tangent."""
     n, told, slides = len(system.freedoms_), [*system.square], np.array([each.slides for each in system.freedoms_])
     told += [each for each in system.told if each not in told and _carriers(each)]
-    off = np.where(slides, 0.0, FROM * np.arange(1, n + 1))
+    off = np.where(slides, 0.0, ZERO_TO_GOAL_OFFSET_RAD * np.arange(1, n + 1))
     record = _record(
         [_joint(each, *system.transform(off, k)) for k, each in enumerate(system.freedoms_)], n, system.carrying
     )
@@ -159,7 +159,7 @@ def _displaced_tip(each: CarriedCondition, R: Array, p: Array) -> tuple[Any, Any
         return write_numbers(_near(R @ c.c)), {"plane": write_numbers([_near(c.h * c.a), _near(c.a)])}, 1
     if isinstance(c, OnRevolution) and float(c.f[2]) == -1.0 and float(c.f[1]) == 0.0:
         return b, {"sphere": write_numbers([_near(c.o), _near(c.f[:1])])}, 0
-    raise NotAccepted(f"legs have conditions that the checker does not know: {type(c).__name__}")
+    raise CertificateRejection(f"legs have conditions that the checker does not know: {type(c).__name__}")
 
 
 def _normals(joints: Sequence[Any]) -> list[Any]:
@@ -181,8 +181,10 @@ def _normals(joints: Sequence[Any]) -> list[Any]:
     for row in short.table():
         v = [int(c) for c in row]
         for u in found:  # nearly at right angles to those before
-            by = Fraction(round(STEPS * dot(u, v) / dot(u, u)), STEPS)
-            v = [STEPS * a - int(STEPS * by) * b for a, b in zip(v, u, strict=True)]
+            by = Fraction(round(NORMAL_DENOMINATOR_COUNT * dot(u, v) / dot(u, u)), NORMAL_DENOMINATOR_COUNT)
+            v = [
+                NORMAL_DENOMINATOR_COUNT * a - int(NORMAL_DENOMINATOR_COUNT * by) * b for a, b in zip(v, u, strict=True)
+            ]
         found.append([c // gcd(*v) for c in v])
     return [[str(c) for c in v] for v in found]
 

@@ -17,13 +17,13 @@ from ..analysis.measured import MeasuredRobot
 from ..analysis.modes.modes import AssemblyModes
 from ..analysis.modes.quadrics import UNIT, WorkingFrame
 from ..analysis.modes.solve import SystemMode
-from ..constraints.pattern import leg_ends
-from ..geometry.vectors import Array, inverse
+from ..constraints.pattern import list_leg_ends
+from ..geometry.vectors import Array, invert_pose
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.observations.direction import Direction
 from ..mechanism.observations.encoder import Encoder
-from ..tolerances import CLOSED
+from ..tolerances import CLOSURE_RESIDUAL_TOL
 
 
 def write_numbers(values: Any) -> Any:
@@ -72,7 +72,7 @@ class ClosedRobot:
                 each.configuration
                 for each in self.found.modes
                 if each.bodies is not None
-                and all(np.abs(X - each.bodies[body]).max() <= CLOSED for body, X in bodies.items())
+                and all(np.abs(X - each.bodies[body]).max() <= CLOSURE_RESIDUAL_TOL for body, X in bodies.items())
             ),
             None,
         )
@@ -93,7 +93,9 @@ class ClosedRobot:
     ) -> dict[str, Any]:
         """A system's frame, and its tips as points or, the last, arrows of the robot's links, by where they are at a
         configuration in working coordinates."""
-        names = leg_ends(self.found.setup.decomposition) if self.found.confined is None else self.found.confined.bodies
+        names = (
+            list_leg_ends(self.found.setup.decomposition) if self.found.confined is None else self.found.confined.bodies
+        )
         length, found = at.model.length, []
         for k, (body, tip) in enumerate(zip(bodies, tips, strict=True)):
             link, point = names[body], float(k < len(tips) - arrows)
@@ -106,7 +108,7 @@ class ClosedRobot:
 
 def displacement(mechanism: Mechanism, at: ClosedConfiguration, link: str) -> Array:
     """D of a link since the zero configuration of a mechanism, shape (3, 4)."""
-    X = at.pose(link) @ inverse(mechanism.links[link].pose)
+    X = at.pose(link) @ invert_pose(mechanism.links[link].pose)
     return np.column_stack([X[:3, :3], X[:3, 3] / at.model.length])
 
 

@@ -26,20 +26,20 @@ from ..analysis.modes.quadrics import WorkingFrame
 from ..analysis.modes.single_loop import SingleLoop, solve_loop
 from ..analysis.modes.solve import SystemModes
 from ..analysis.observed import ObservedRobot
-from ..errors import NoCertificate, SystemNotSolved, UnsupportedLocus
+from ..errors import ExternalSolverFailure, NoCertificate, UnsupportedLocus
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism import Mechanism
 from ..mechanism.pose import Pose
-from ..tolerances import NO_POSE_START
+from ..tolerances import EXTRANEOUS_START_TOL
 from .bounds import bound
 from .chains import chains
 from .closures import ClosedRobot, write_numbers
 from .planar_records import closings
 from .proposed import ProposedRecord
-from .refining import Polynomial, Refining
+from .refining import Polynomial, ScaledEquations
 from .system_records import propose
-from .verify_certificate import KINDS, NotAccepted, digest, integral, rational, told, value, verify
+from .verify_certificate import KINDS, CertificateRejection, digest, integral, rational, told, value, verify
 
 RADIUS = Fraction(1, 1 << 80)
 """Radius of the boxes (unknowns of size one)."""
@@ -56,7 +56,7 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
         "robot": found.setup.robot.name,
         "kind": found.kind,
         "at": found.pose.to_dict(),
-        "observed": [[o.leg, o.link if o.by_segment else o.leg] for o in found.setup.observed],
+        "observed": [[o.leg, o.link if o.is_segment_direction else o.leg] for o in found.setup.observed],
     }
     if found.found.complete and not found.found.solved and found.confined is not None:  # a copy: solved again
         found = modes(found.setup, at=found.goal, real=found.kind == "real", as_written=found.confined.as_written)
@@ -66,7 +66,7 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
         if found.found.complete and isinstance(system, CarriedPlatform):
             try:
                 return of_chain(system, found, about, robot)
-            except NotAccepted as reason:
+            except CertificateRejection as reason:
                 other = solve_carried if isinstance(system, SingleLoop) else solve_loop
                 return _as_chain(found, about, robot, reason, other)
         if found.found.complete and not found.found.solved:
@@ -74,20 +74,20 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
                 return of_loops(found, about, robot)
         try:
             return of_systems(found.found, about, robot)
-        except NotAccepted as reason:
+        except CertificateRejection as reason:
             if found.found.solved or not found.found.complete:
                 raise
             return _as_chain(found, about, robot, reason, solve_carried, solve_loop)
-    except NotAccepted as reason:
+    except CertificateRejection as reason:
         raise NoCertificate(found.setup.robot.name, str(reason)) from None
 
 
 def of_systems(found: SystemModes, about: Mapping[str, Any], robot: ClosedRobot | None = None) -> dict[str, Any]:
-    """The certificate of the modes of systems, with what they are ``about``; raises ``NotAccepted``."""
+    """The certificate of the modes of systems, with what they are ``about``; raises ``CertificateRejection``."""
     if not found.complete:
-        raise NotAccepted("the list is not proved complete")
+        raise CertificateRejection("the list is not proved complete")
     if not found.solved:
-        raise NotAccepted("the list is complete by conditions of kinds that the checker does not support")
+        raise CertificateRejection("the list is complete by conditions of kinds that the checker does not support")
     proposed = [propose(each, robot) for each in found.solved]
     return _seal(
         [_system(each, robot) for each in proposed],
@@ -98,7 +98,7 @@ def of_systems(found: SystemModes, about: Mapping[str, Any], robot: ClosedRobot 
 
 
 def of_loops(found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot | None) -> dict[str, Any]:
-    """The certificate of the modes of a planar mechanism from its joints; raises ``NotAccepted``,
+    """The certificate of the modes of a planar mechanism from its joints; raises ``CertificateRejection``,
     ``UnsupportedLocus``."""
     system = None if found.model is None else found.model.system
     if not isinstance(system, PlanarLoops):
@@ -110,7 +110,7 @@ def of_loops(found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot 
 def of_chain(
     system: CarriedPlatform, found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot | None
 ) -> dict[str, Any]:
-    """The certificate of a platform that a leg carries, or of a single loop; raises ``NotAccepted``."""
+    """The certificate of a platform that a leg carries, or of a single loop; raises ``CertificateRejection``."""
     assert found.model is not None
     modes_, why = found.found.modes, "no joint of its loop is between its base and its platform"
     frame = WorkingFrame(system.middle.origin, system.rows, system.size, system.rows[2])
@@ -126,25 +126,25 @@ def of_chain(
             try:
                 made = _system(ProposedRecord(each.record, each.starts, poses, kept, bodies, frame), robot)
                 return _seal([made], about, robot, found.found.complex or 0)
-            except NotAccepted as reason:
+            except CertificateRejection as reason:
                 why = str(reason)
         else:
             why = f"{len(each.starts)} solutions were enclosed, {sum(kept)} of {len(modes_)} modes among them"
-    raise NotAccepted(why)
+    raise CertificateRejection(why)
 
 
 def _as_chain(
     found: AssemblyModes,
     about: Mapping[str, Any],
     robot: ClosedRobot | None,
-    reason: NotAccepted,
+    reason: CertificateRejection,
     *ways: Callable[[MeasuredRobot, ClosedConfiguration, float], tuple[Model, SystemModes]],
 ) -> dict[str, Any]:
     """Return the certificate of a mechanism that is a carried platform, or one loop, besides the method of its list;
-    raises ``NotAccepted``."""
+    raises ``CertificateRejection``."""
     assert found.model is not None
     for way in ways:
-        with suppress(UnsupportedLocus, SystemNotSolved, NotAccepted):
+        with suppress(UnsupportedLocus, ExternalSolverFailure, CertificateRejection):
             model, listed = way(_measured_robot(found), found.goal, found.model.system.error)
             system = model.system
             if listed.complete and listed.complex == found.found.complex and isinstance(system, CarriedPlatform):
@@ -193,9 +193,9 @@ def _system(proposed: ProposedRecord, robot: ClosedRobot | None) -> dict[str, An
     equations, halves, points, legs = KINDS[record["kind"]][0](record, rational(record["tips"]))
     equations = [integral(p) for p in equations]
     if len(equations) != len(halves):
-        raise NotAccepted(f"{len(equations)} equations in {len(halves)} unknowns")
+        raise CertificateRejection(f"{len(equations)} equations in {len(halves)} unknowns")
     real = iter(zip(proposed.poses, proposed.kept, proposed.bodies, strict=True))
-    record["boxes"], refining = [], Refining(equations)
+    record["boxes"], refining = [], ScaledEquations(equations)
     for start, is_real_ in [*proposed.starts, *((each, None) for each in _no_poses(equations, halves))]:
         middle, inverse = refining.box(start, bool(is_real_))
         box = {"middle": write_numbers(middle), "radius": str(RADIUS), "inverse": write_numbers(inverse)}
@@ -229,7 +229,7 @@ def _worst_leg(legs: Any, middle: Any) -> int:
     """The leg that misses most at a solution of the square part."""
     off = [max(sum(map(abs, value(p, middle))) for p in leg) for leg in legs]
     if not off or max(off) < RADIUS:
-        raise NotAccepted("a solution that is not proved to miss a leg")
+        raise CertificateRejection("a solution that is not proved to miss a leg")
     return off.index(max(off))
 
 
@@ -240,10 +240,10 @@ def _pose(record: dict[str, Any], box: dict[str, Any], points: Any, placed: Arra
         given = {"pose": write_numbers([[Fraction(float(x)) for x in row] for row in placed]), "within": str(within)}
         try:
             told(record, given, points, tips, m, r)
-        except NotAccepted:
+        except CertificateRejection:
             continue
         return given
-    raise NotAccepted("a pose that is not where its box puts it")
+    raise CertificateRejection("a pose that is not where its box puts it")
 
 
 def _no_poses(equations: Sequence[Polynomial], halves: Sequence[bool]) -> list[list[complex]]:
@@ -261,7 +261,7 @@ def _no_poses(equations: Sequence[Polynomial], halves: Sequence[bool]) -> list[l
             rows.append(row)
         for y in np.roots(rows[0][::-1]):
             x = [at, y] if k == 0 else [y, at]
-            new = all(abs(np.subtract(x, z)).max() > NO_POSE_START for z in found)
-            if new and abs(np.polyval(rows[1][::-1], y)) < NO_POSE_START:
+            new = all(abs(np.subtract(x, z)).max() > EXTRANEOUS_START_TOL for z in found)
+            if new and abs(np.polyval(rows[1][::-1], y)) < EXTRANEOUS_START_TOL:
                 found.append(x)
     return found

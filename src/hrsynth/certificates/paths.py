@@ -10,26 +10,26 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.aspects.path import PathAnswer, PathPlanner, between_poses
+from ..analysis.aspects.path import PathAnswer, PathPlanner, plan_between_poses
 from ..analysis.aspects.path_segments import StraightSegment
-from ..analysis.aspects.vector_expressions import DerivedVector, LegVector, VectorExpression, limbs_of
+from ..analysis.aspects.vector_expressions import DerivedVector, LegVector, VectorExpression, collect_subchains
 from ..analysis.aspects.verdicts import SEPARATED
 from ..analysis.observed import ObservedRobot
 from ..closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
 from ..closed_forms.platform_points import PlatformPoint
-from ..constraints.condition import Named
+from ..constraints.condition import NamedCondition
 from ..errors import NoCertificate
-from ..geometry.so3 import quaternions, rotation_of
+from ..geometry.so3 import convert_from_quaternion, convert_to_quaternions
 from ..geometry.vectors import Array
 from ..mechanism import Mechanism
 from ..mechanism.pose import Pose
-from ..tolerances import FOLLOWED
+from ..tolerances import HIDDEN_ROBOT_RESIDUAL_TOL
 from .closures import write_numbers
-from .verify_path import PathNotAccepted, condition, digest, node, place, sign, verify
+from .verify_path import PathRejection, condition, digest, node, place, sign, verify
 
-PIVOT = 0.1
+TWIST_PIVOT_MIN = 0.1
 """Smallest part along an axis of the base by which a vector of a platform's motions is scaled to one there."""
-PIECES = 4096
+PATH_PIECES_MAX = 4096
 """Pieces into which a way is cut at most."""
 
 Node = list[Any]
@@ -41,11 +41,11 @@ def certificate(found: PathAnswer) -> dict[str, Any]:
     name = found.setup.robot.name
     if not found.certified:
         raise NoCertificate(name, found.reason or "no path was proved")
-    if not all(o.by_segment for o in found.setup.observed):
+    if not all(o.is_segment_direction for o in found.setup.observed):
         raise NoCertificate(name, "an observation is not the direction of a segment")
     aspects = PathPlanner.of(found.setup)
     assert not isinstance(aspects.pattern, str)
-    assert isinstance(aspects.condition, Named)
+    assert isinstance(aspects.condition, NamedCondition)
     forms, motion = aspects.enclosure(found.start.configuration).forms, WrittenMotions.of(aspects)
     try:
         record = {
@@ -65,7 +65,7 @@ def certificate(found: PathAnswer) -> dict[str, Any]:
             "condition": _tree(aspects.condition.expression),
         }
         if found.verdict == SEPARATED:
-            used = limbs_of(tuple(forms.vectors.values()))
+            used = collect_subchains(tuple(forms.vectors.values()))
             record["modes"] += sorted(
                 {
                     modes
@@ -84,7 +84,7 @@ def certificate(found: PathAnswer) -> dict[str, Any]:
         record["ends"] = [record["path"][0], record["path"][-1]]
         record["sha256"] = digest(record)
         verify(record)
-    except PathNotAccepted as reason:
+    except PathRejection as reason:
         raise NoCertificate(name, str(reason)) from None
     return record
 
@@ -106,13 +106,13 @@ class WrittenMotions:
         coordinates = aspects.pattern.coordinates
         p, R = coordinates.of(aspects.members[:1])
         turns = coordinates.motion.rotations[:, : 3 * coordinates.turning]
-        home = np.eye(4)[0] if turns.shape[1] == 3 else quaternions(R[0])
+        home = np.eye(4)[0] if turns.shape[1] == 3 else convert_to_quaternions(R[0])
         return cls(p[0], _reduced(coordinates.motion.translations.T), home, _reduced(turns.T))
 
     def node(self, p: Array, R: Array, before: Node | None) -> Node:
         """A pose, its quaternion on the side of the one before."""
         shift = np.linalg.lstsq(self.along.T, p - self.origin, rcond=None)[0]
-        w, *v = quaternions(R @ rotation_of(self.home).T)
+        w, *v = convert_to_quaternions(R @ convert_from_quaternion(self.home).T)
         turn = np.array([w, *np.linalg.lstsq(self.about.T, np.array(v), rcond=None)[0]])
         if before is not None and sum(float(Fraction(x)) * y for x, y in zip(before[1], turn, strict=True)) < 0:
             turn = -turn
@@ -130,20 +130,20 @@ def _reduced(rows: Array) -> Array:
     for column in range(3):
         if done < len(found):
             best = done + int(np.argmax(np.abs(found[done:, column])))
-            if abs(found[best, column]) > PIVOT:
+            if abs(found[best, column]) > TWIST_PIVOT_MIN:
                 found[[done, best]] = found[[best, done]]
                 found[done] /= found[done, column]
                 others = np.arange(len(found)) != done
                 found[others] -= np.outer(found[others, column], found[done])
                 done += 1
-    return np.where(np.abs(found - np.round(found)) < FOLLOWED, np.round(found), found)
+    return np.where(np.abs(found - np.round(found)) < HIDDEN_ROBOT_RESIDUAL_TOL, np.round(found), found)
 
 
 def again(record: dict[str, Any], robot: Mechanism) -> dict[str, Any]:
     """Return the certificate of the same claim about a robot."""
     setup = ObservedRobot.of(robot, [link for _, link in record["observed"]])
     ends = [_pose(record[end]) for end in ("start", "goal")]
-    return certificate(between_poses(setup, ends, any_mode=bool(record["any_mode"])))
+    return certificate(plan_between_poses(setup, ends, any_mode=bool(record["any_mode"])))
 
 
 def _pose(record: dict[str, Any]) -> Pose:
@@ -156,7 +156,7 @@ def _pose(record: dict[str, Any]) -> Pose:
 def _cut(record: dict[str, Any], motion: WrittenMotions, ways: Sequence[StraightSegment], count: int) -> list[Node]:
     """Poses along straight ways, so near to each other that the checker's intervals prove each piece."""
     if not ways or len(ways) < count:
-        raise PathNotAccepted("a leg changes its working mode along the path")
+        raise PathRejection("a leg changes its working mode along the path")
 
     def at(way: StraightSegment, fraction: float, before: Node | None) -> Node:
         p, R = way.at(np.array([fraction]))
@@ -170,8 +170,8 @@ def _cut(record: dict[str, Any], motion: WrittenMotions, ways: Sequence[Straight
             if _is_proved(record, found[-1], new):
                 found.append(new)
                 low = ends.pop()
-            elif len(found) + len(ends) > PIECES or ends[-1] - low < 1.0 / PIECES:
-                raise PathNotAccepted("too many short pieces for the checker's intervals")
+            elif len(found) + len(ends) > PATH_PIECES_MAX or ends[-1] - low < 1.0 / PATH_PIECES_MAX:
+                raise PathRejection("too many short pieces for the checker's intervals")
             else:
                 ends.append((low + ends[-1]) / 2)
     return found
@@ -181,7 +181,7 @@ def _is_proved(record: dict[str, Any], one: Node, other: Node) -> bool:
     try:
         motion = record["motion"]
         sign(condition(record, record["modes"][0], *place(motion, node(one, motion), node(other, motion))))
-    except PathNotAccepted:
+    except PathRejection:
         return False
     return True
 
@@ -206,7 +206,7 @@ def _leg(limb: ClosedFormLeg) -> dict[str, Any]:
             "aside": write_numbers(float(limb.aside)),
             **found,
         }
-    raise PathNotAccepted("a leg of a kind that the checker does not support")
+    raise PathRejection("a leg of a kind that the checker does not support")
 
 
 def _rule(point: PlatformPoint) -> list[Any]:
@@ -235,4 +235,4 @@ def _tree(expression: Any) -> Any:
         return ["*", *[_tree(expression.base)] * int(expression.exp)]
     if type(expression).__name__ in ("dot", "cross", "det"):
         return [type(expression).__name__, *map(_tree, expression.args)]
-    raise PathNotAccepted("a condition that is not an expression in vectors")
+    raise PathRejection("a condition that is not an expression in vectors")

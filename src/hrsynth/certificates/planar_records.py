@@ -13,11 +13,11 @@ from ..analysis.modes.planar_modes import enclosures, is_excluded
 from ..analysis.modes.quadrics import WorkingFrame
 from ..analysis.modes.solve import SquareSolution
 from ..analysis.modes.square_systems import SquareSystem
-from ..geometry.vectors import Array, cross, rotation_about
+from ..geometry.vectors import Array, cross, rotate_about_axis
 from .closures import round_numbers, write_numbers
 from .proposed import ProposedRecord, placed_in, starts_of
 from .reach_records import point_on, reach_record
-from .verify_certificate import NotAccepted
+from .verify_certificate import CertificateRejection
 
 
 def in_space(frame: WorkingFrame) -> WorkingFrame:
@@ -68,11 +68,11 @@ def closings(system: PlanarLoops, count: int) -> ProposedRecord:
     q = [np.array([*np.arctan2(x[n : 2 * n], x[:n]), *x[2 * n :]]) for x in (box.middle.real for box in real)]
     kept = [not is_excluded(system, box) for box in real]
     if sum(kept) + (not system.besides) * (len(boxes) - len(real)) != count:
-        raise NotAccepted("the solutions of the loops are not those of the list")
+        raise CertificateRejection("the solutions of the loops are not those of the list")
     poses = [
         np.column_stack(
             [
-                rotation_about((0.0, 0.0, 1.0), float(np.array(system.turns[first]) @ x[:n])),
+                rotate_about_axis((0.0, 0.0, 1.0), float(np.array(system.turns[first]) @ x[:n])),
                 frame.point(system.pose_of(first, x)[:3, 3]),
             ]
         )

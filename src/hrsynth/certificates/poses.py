@@ -18,25 +18,25 @@ import numpy as np
 
 from ..analysis.modes.loci import Plane, Sphere
 from ..analysis.modes.pose_coordinate_solver import by_homotopy
-from ..analysis.modes.quadrics import BITS, PoseSystem
+from ..analysis.modes.quadrics import COORDINATE_BITS_COUNT, PoseSystem
 from ..analysis.modes.rigid import Spatial
-from ..geometry.so3 import quaternions
+from ..geometry.so3 import convert_to_quaternions
 from ..geometry.vectors import Array
 from .closures import write_numbers
-from .refining import Polynomial, Refining
-from .verify_certificate import KINDS, NotAccepted, conditions, integral, poses, rational, reach_of
+from .refining import Polynomial, ScaledEquations
+from .verify_certificate import KINDS, CertificateRejection, conditions, integral, poses, rational, reach_of
 
 FIRST, ROUGH = Fraction(1, 4), Fraction(1, 1 << 11)
-EXACT = [Fraction(1, 1 << k) for k in (12, 13, 15, 18, 22, BITS // 2)]
+EXACT = [Fraction(1, 1 << k) for k in (12, 13, 15, 18, 22, COORDINATE_BITS_COUNT // 2)]
 """Roots of the moves: the first, from where on numbers have more digits, and those that follow."""
 STEP, SHORTEST, NEAR = 0.05, 1e-4, 0.3
 """What part of the way is gone at once at most, and at least; and how far a solution may be from where it was expected,
 of its distance from others."""
-DEGREE = 3
+PERTURBED_EQUATION_DEGREE_COUNT = 3
 """Of the equations in the move."""
-STEPS = 6
+PERTURBED_NEWTON_STEPS_COUNT = 6
 """Newton's steps after each move."""
-ATTEMPTS = 3
+PERTURBATION_DIRECTIONS_MAX = 3
 """Random directions in which all is moved."""
 GRAIN = 1 << 20
 """One over the grain of random directions and of roots."""
@@ -54,12 +54,14 @@ def regular(record: dict[str, Any], starts: Starts) -> tuple[dict[str, Any], Sta
     most = poses([{}] * 7, (), record)
     if most != 40 or most == len(found):
         return record, found
-    for seed in range(ATTEMPTS):
-        moved = _Moved(_split(record), random.Random(seed))
+    for seed in range(PERTURBATION_DIRECTIONS_MAX):
+        moved = _MovedSystem(_split(record), random.Random(seed))
         ends = _follow_infinity(moved, E, most, most - len(found))
         if ends is not None:
             return moved.at(EXACT[-1] ** 2), found + [(each, None) for each in ends]
-    raise NotAccepted(f"{len(found)} solutions are enclosed, but those at infinity, of {most} together, are not")
+    raise CertificateRejection(
+        f"{len(found)} solutions are enclosed, but those at infinity, of {most} together, are not"
+    )
 
 
 def _coordinates(E: Array, e: Any, g: Any) -> Any:
@@ -83,7 +85,7 @@ def _split(record: dict[str, Any]) -> dict[str, Any]:
     return record | {"reaches": reaches, "tips": tips}
 
 
-class _Moved:
+class _MovedSystem:
     """A system, each number of which moves along a random direction."""
 
     def __init__(self, record: dict[str, Any], rng: random.Random) -> None:
@@ -114,7 +116,7 @@ def _add(x: Any, along: Any, by: Fraction) -> Any:
     return [_add(a, b, by) for a, b in zip(x, along, strict=True)] if isinstance(x, list) else x + by * along
 
 
-def _follow_infinity(moved: _Moved, E: Array, most: int, count: int) -> list[list[Any]] | None:
+def _follow_infinity(moved: _MovedSystem, E: Array, most: int, count: int) -> list[list[Any]] | None:
     """About where the ``count`` solutions at infinity are (7,) after the least move; None where they are not found.
 
     They are power series in the root s of the move: each is predicted by the parabola through the last three. Complex
@@ -139,9 +141,11 @@ def _follow_infinity(moved: _Moved, E: Array, most: int, count: int) -> list[lis
     order = np.argsort(np.abs((e * e).sum(axis=1)) / (np.abs(e) ** 2).sum(axis=1))[:count]
     ends = [[each[k].astype(object) for each in found[-3:]] for k in order]
     for exact in EXACT:
-        refining, s = Refining([integral(p) for p in _equations(moved.at(exact**2))]), complex(exact)
+        refining, s = ScaledEquations([integral(p) for p in _equations(moved.at(exact**2))]), complex(exact)
         for each in ends:
-            each.append(np.array(refining.near(_predict(roots[-3:], each[-3:], s), STEPS), dtype=object))
+            each.append(
+                np.array(refining.near(_predict(roots[-3:], each[-3:], s), PERTURBED_NEWTON_STEPS_COUNT), dtype=object)
+            )
         roots.append(s)
     return [list(each[-1]) for each in ends]
 
@@ -175,7 +179,7 @@ def _first(record: dict[str, Any], E: Array) -> Any:
     x = np.array([[1.0, *(complex(v) for v in each)] for each, _ in found.solutions]).reshape(-1, 8)
     e, g = x @ part.chart.study[:4].T, x @ part.chart.study[4:].T
     p = 2 * _product(g, e * (1, -1, -1, -1))[:, 1:] / (e * e).sum(axis=1)[:, None]
-    e = _product(np.array([quaternions(frame.R.T)]), e)
+    e = _product(np.array([convert_to_quaternions(frame.R.T)]), e)
     p = frame.size * p @ frame.R + frame.origin
     return _coordinates(E, e, _product(np.column_stack([np.zeros(len(p)), p]), e) / 2)
 
@@ -189,9 +193,11 @@ def _product(a: Any, b: Any) -> Any:
 class _Floats:
     """The checker's equations in floating point, polynomials of the move."""
 
-    def __init__(self, moved: _Moved) -> None:
-        at = [Fraction(k, 64) for k in range(DEGREE + 1)]
-        powers = np.linalg.inv(np.array([[float(x) ** k for k in range(DEGREE + 1)] for x in at]))
+    def __init__(self, moved: _MovedSystem) -> None:
+        at = [Fraction(k, 64) for k in range(PERTURBED_EQUATION_DEGREE_COUNT + 1)]
+        powers = np.linalg.inv(
+            np.array([[float(x) ** k for k in range(PERTURBED_EQUATION_DEGREE_COUNT + 1)] for x in at])
+        )
         self.terms = []
         for several in zip(*(_equations(moved.at(by)) for by in at), strict=True):
             exponents = sorted(set().union(*several))
@@ -200,9 +206,9 @@ class _Floats:
 
     def near(self, by: complex, x: Any) -> Any:
         """Solutions (n, 7) near others; not finite where they are not found."""
-        terms = [(e, by ** np.arange(DEGREE + 1) @ C) for e, C in self.terms]
+        terms = [(e, by ** np.arange(PERTURBED_EQUATION_DEGREE_COUNT + 1) @ C) for e, C in self.terms]
         with np.errstate(all="ignore"):
-            for _ in range(STEPS):
+            for _ in range(PERTURBED_NEWTON_STEPS_COUNT):
                 x = self._step(terms, x)
         return x
 

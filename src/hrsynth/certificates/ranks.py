@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..analysis.derive import Derivation, derive
-from ..analysis.exact import architecture
-from ..analysis.instances import NotRecognised
+from ..analysis.exact import get_architecture
+from ..analysis.instances import RecognitionFailure
 from ..errors import NoCertificate
 from ..mechanism import Mechanism
 from .verify_ranks import PRIME, digest, verify
@@ -22,10 +22,10 @@ def certificate(found: Derivation) -> dict[str, Any]:
 
     The legs observe rank [A; X] + rank [A; Y] − rank [A; Y; X] − rank A of the platform's dof. Raises
     ``NoCertificate`` if there are no instances."""
-    exact, name = architecture(found.setup), found.robot.name
+    exact, name = get_architecture(found.setup), found.robot.name
     try:
         at = exact.instance(0)
-    except NotRecognised as reason:
+    except RecognitionFailure as reason:
         raise NoCertificate(name, str(reason)) from None
     places = [i for i, o in enumerate(exact.observations) if o.key in {each.key for each in found.setup.observed}]
     if len(places) < len(found.setup.observed):
@@ -61,7 +61,7 @@ def describe_ranks(record: dict[str, Any]) -> str:
 
 def again(record: dict[str, Any], robot: Mechanism) -> dict[str, Any]:
     """Return the certificate of the same claim about a robot."""
-    others = {each.leg for each in robot.observations if not each.by_segment}
+    others = {each.leg for each in robot.observations if not each.is_segment_direction}
     return certificate(derive(robot, [leg if leg in others else link for leg, link in record["observed"]]))
 
 

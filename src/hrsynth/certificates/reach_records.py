@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..analysis.modes.loci import Circle, Line, Point, Reach, Sphere
-from ..analysis.modes.quadrics import UNIT, Rounded, WorkingFrame, direction, spokes
-from ..geometry.so3 import quaternions
-from ..geometry.vectors import cross, unit
+from ..analysis.modes.quadrics import UNIT, RoundedConic, WorkingFrame, direction, spokes
+from ..geometry.so3 import convert_to_quaternions
+from ..geometry.vectors import cross, normalise_vector
 from .closures import round_numbers, write_numbers
 from .verify_certificate import dot
 
@@ -30,19 +30,20 @@ def reach_record(reach: Reach, frame: WorkingFrame, turn: float) -> dict[str, An
     if isinstance(reach, Circle):
         return {"circle": write_numbers([centre, *_spokes(reach, frame, turn)])}
     rest = [] if isinstance(reach, Point) else [reach.direction if isinstance(reach, Line) else reach.normal]
-    exact = [[Fraction(int(x), UNIT) for x in direction(each, frame, Rounded)] for each in rest]
+    exact = [[Fraction(int(x), UNIT) for x in direction(each, frame, RoundedConic)] for each in rest]
     return {type(reach).__name__.lower(): write_numbers([centre, *exact])}
 
 
 def _spokes(circle: Circle, frame: WorkingFrame, turn: float) -> list[list[Fraction]]:
     """Two spokes of a circle, exactly normal to each other and of one length: those of a rational rotation."""
-    given = spokes(circle, frame, turn, Rounded)
+    given = spokes(circle, frame, turn, RoundedConic)
     a, b = ([Fraction(int(x), UNIT) for x in each] for each in given)
     if len(a) == 2 or dot(a, b) == 0 == dot(a, a) - dot(b, b):
         return [a, b]
-    first, second = unit(given[0].astype(float)), unit(given[1].astype(float))
+    first, second = normalise_vector(given[0].astype(float)), normalise_vector(given[1].astype(float))
     w, x, y, z = (
-        Fraction(round(float(c) * UNIT)) for c in quaternions(np.column_stack([first, second, cross(first, second)]))
+        Fraction(round(float(c) * UNIT))
+        for c in convert_to_quaternions(np.column_stack([first, second, cross(first, second)]))
     )
     s = round_numbers(circle.radius / frame.size) / (w * w + x * x + y * y + z * z)
     return [

@@ -8,22 +8,22 @@ from typing import Any
 
 import numpy as np
 
-from .verify_certificate import NotAccepted, slope
+from .verify_certificate import CertificateRejection, slope
 
-BITS = 320
+SOLUTION_BITS_COUNT = 320
 """Bits with which solutions are refined."""
-STEPS = 7
+SOLUTION_NEWTON_STEPS_COUNT = 7
 """Newton's steps from about the solution."""
 GRAIN = 1 << 140
 """Middles of boxes are multiples of one over this."""
-STEEP = 1e10
+DERIVATIVE_CONDITION_MAX = 1e10
 """Condition number of the derivatives above which floats do not give their inverse (the checker needs a good one
 alone)."""
 
 Polynomial = Mapping[tuple[int, ...], Any]
 
 
-class Refining:
+class ScaledEquations:
     """Equations, each over the power of two that the checker takes, and their derivatives."""
 
     def __init__(self, equations: Sequence[Polynomial]) -> None:
@@ -33,7 +33,7 @@ class Refining:
         scales = [Fraction(1, 2 ** max(map(abs, p.values())).bit_length()) for p in equations]
         flat = [{e: c * s for e, c in p.items()} for p, s in zip(equations, scales, strict=True)]
         self.degree = max(k for p in flat for e in p for k in e)
-        with ctx.workprec(BITS):
+        with ctx.workprec(SOLUTION_BITS_COUNT):
             self.rows = [
                 [
                     [
@@ -65,21 +65,21 @@ class Refining:
         """A solution near a start; raises ``ZeroDivisionError``."""
         from flint import acb, ctx
 
-        with ctx.workprec(BITS):
+        with ctx.workprec(SOLUTION_BITS_COUNT):
             return self.step([acb(z).mid() for z in start], steps)[0]
 
     def box(self, start: Sequence[Any], real: bool) -> tuple[Any, Any]:
         """A solution near a start, as pairs of fractions, and about the inverse of the derivatives there."""
         from flint import acb, ctx
 
-        with ctx.workprec(BITS):
+        with ctx.workprec(SOLUTION_BITS_COUNT):
             try:
-                x, J = self.step([acb(z.real) if real else acb(z).mid() for z in start], STEPS)
+                x, J = self.step([acb(z.real) if real else acb(z).mid() for z in start], SOLUTION_NEWTON_STEPS_COUNT)
                 inverse = J.inv()
             except ZeroDivisionError:
-                raise NotAccepted("a solution at which the equations are not independent") from None
+                raise CertificateRejection("a solution at which the equations are not independent") from None
             rough = np.array([[complex(v) for v in row] for row in J.table()])
-            about = fraction if np.linalg.cond(rough) > STEEP else _float
+            about = fraction if np.linalg.cond(rough) > DERIVATIVE_CONDITION_MAX else _float
             middle = [[fraction(v.real), Fraction(0) if real else fraction(v.imag)] for v in x]
             return middle, [[[about(v.real), about(v.imag)] for v in row] for row in inverse.table()]
 

@@ -14,14 +14,14 @@ from ..analysis.modes.quadrics import PoseSystem, WorkingFrame
 from ..analysis.modes.rigid import Planar, Spatial
 from ..analysis.modes.solve import SquareSolution
 from ..analysis.modes.square_systems import TURNS, SquareSystem
-from ..analysis.modes.translating import Articulated, Translating, coplanar, met_normal
+from ..analysis.modes.translating import ArticulatedPlatform, TranslatingPlatform, is_coplanar, met_normal
 from ..geometry.vectors import Array
 from .closures import ClosedRobot, round_numbers, write_numbers
 from .planar_records import in_space, planar_system
 from .poses import regular
 from .proposed import ProposedRecord, placed_in, starts_of
 from .reach_records import point_on, reach_record
-from .verify_certificate import NotAccepted
+from .verify_certificate import CertificateRejection
 
 
 def propose(solved: SquareSolution, robot: ClosedRobot | None) -> ProposedRecord:
@@ -48,7 +48,7 @@ def _write_system(
     if isinstance(part, PoseSystem):
         return _pose_system(solved)
     if not part.unknowns or part.frame is None:
-        raise NotAccepted("fixed tips leave one pose: there is nothing to enclose")
+        raise CertificateRejection("fixed tips leave one pose: there is nothing to enclose")
     frame, turns = part.frame, part.turns(roots.turn)
     values, real = starts_of(roots)
     if isinstance(system, Planar):
@@ -67,15 +67,15 @@ def _write_system(
             "square": len(part.legs),
         }
         return record, list(zip(values, real, strict=True)), [placed_in(mode.pose, frame, 3) for mode in solved.modes]
-    assert isinstance(system, Translating | Articulated)
-    if isinstance(system, Translating):
+    assert isinstance(system, TranslatingPlatform | ArticulatedPlatform)
+    if isinstance(system, TranslatingPlatform):
         record, starts = _translating(system, part, frame, turns, values)
     else:
         record, starts = _write_articulated(system, part, frame, turns, values)
-    origin = _middle(part, system) if isinstance(system, Articulated) else frame.origin
+    origin = _middle(part, system) if isinstance(system, ArticulatedPlatform) else frame.origin
     record |= {"kind": "shifting", "square": len(record["reaches"])}
     if not part.whole:  # then all legs are used, and what is solved first
-        bodies = [0] * len(system.paths) if isinstance(system, Translating) else system.bodies
+        bodies = [0] * len(system.paths) if isinstance(system, TranslatingPlatform) else system.bodies
         paths = [shift_reach(each, frame.origin - origin) for each in system.paths]
         record["reaches"] = [*record["reaches"], *(reach_record(each, frame, 0.0) for each in paths)]
         record["bodies"] = [*record["bodies"], *bodies]
@@ -94,7 +94,7 @@ def _pose_system(solved: SquareSolution) -> tuple[dict[str, Any], list[tuple[lis
     system, part = solved.system, solved.part
     assert isinstance(part, PoseSystem)
     if not part.whole or sum(system.forbids[k] for k in part.legs) != system.freedoms:
-        raise NotAccepted("tips on surfaces, with redundant observation")
+        raise CertificateRejection("tips on surfaces, with redundant observation")
     frame, (values, real) = part.chart.frame, starts_of(solved.roots)
     if isinstance(system, Spatial) and part.chart.study is not None:
         record = {
@@ -107,8 +107,8 @@ def _pose_system(solved: SquareSolution) -> tuple[dict[str, Any], list[tuple[lis
         }
         poses = [placed_in(mode.pose, frame, 3) for mode in solved.modes]
         return *regular(record, list(zip(values, real, strict=True))), poses
-    if not isinstance(system, Articulated):
-        raise NotAccepted("tips on surfaces of a platform that the checker does not support")
+    if not isinstance(system, ArticulatedPlatform):
+        raise CertificateRejection("tips on surfaces of a platform that the checker does not support")
     turn = TURNS[0]
     record = {
         "kind": "shifting",
@@ -132,7 +132,7 @@ def _pose_system(solved: SquareSolution) -> tuple[dict[str, Any], list[tuple[lis
 
 
 def _translating(
-    system: Translating,
+    system: TranslatingPlatform,
     part: SquareSystem,
     frame: WorkingFrame,
     turns: Sequence[float],
@@ -148,7 +148,7 @@ def _translating(
 
 
 def _write_articulated(
-    system: Articulated,
+    system: ArticulatedPlatform,
     part: SquareSystem,
     frame: WorkingFrame,
     turns: Sequence[float],
@@ -168,13 +168,13 @@ def _write_articulated(
     return {"reaches": reaches, "bodies": bodies, "slide": slide}, starts
 
 
-def _middle(part: SquareSystem, system: Articulated) -> Array:
+def _middle(part: SquareSystem, system: ArticulatedPlatform) -> Array:
     one, other = (system.paths[k].centre for k in part.legs)
     return np.asarray((one + other) / 2)
 
 
 def _meeting_surface(curve: Curve, other: Reach, size: float) -> Reach:
     """The surface that a curve is met with: of a curve of its plane its sphere, or a plane through it."""
-    if isinstance(other, Circle) and coplanar(curve, other, size):
+    if isinstance(other, Circle) and is_coplanar(curve, other, size):
         return Sphere(other.centre, other.radius)
     return other if isinstance(other, Sphere | Plane) else Plane(other.centre, met_normal(curve, other))

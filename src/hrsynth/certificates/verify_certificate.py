@@ -27,13 +27,13 @@ from itertools import combinations, product
 PRIME, FIT, WITHIN, FAR, TERMS, LENGTH = 2147483647, Fraction(1, 10**9), Fraction(1, 10**6), 10**7, 20_000, 5_000_000
 
 
-class NotAccepted(Exception):
+class CertificateRejection(Exception):
     """Certificate that is not accepted: the reason."""
 
 
 def need(true, why):
     if not true:
-        raise NotAccepted(why)
+        raise CertificateRejection(why)
 
 
 def add(*terms):  # a sum of polynomials {exponents: coefficient}
@@ -596,14 +596,16 @@ def once(pairs):
     return need(len(dict(pairs)) == len(pairs), "a duplicate key") or dict(pairs)  # of JSON: read as one
 
 
-def verify(record):  # what a certificate proves, in words; raises NotAccepted
+def verify(record):  # what a certificate proves, in words; raises CertificateRejection
     try:
         need(isinstance(record, dict) and record.get("format") == "hrsynth-certificate-1", "this is no certificate")
         need(record["sha256"] == digest(record), "the file was changed: its digest differs")
         need(record["claim"] == "modes", "it is for another claim: verify_path.py and verify_ranks.py check those")
         return modes(record)
     except Exception as error:
-        raise error if isinstance(error, NotAccepted) else NotAccepted(f"no certificate: {error!r}") from None
+        raise (
+            error if isinstance(error, CertificateRejection) else CertificateRejection(f"no certificate: {error!r}")
+        ) from None
 
 
 def main(name):  # prints the answer
@@ -611,7 +613,7 @@ def main(name):  # prints the answer
         with open(name, encoding="utf-8") as file:
             need(len(text := file.read(LENGTH + 1)) <= LENGTH, f"a file of more than {LENGTH} characters")
         print("accepted:", verify(json.loads(text, object_pairs_hook=once)))
-    except (NotAccepted, OSError, ValueError, RecursionError) as error:
+    except (CertificateRejection, OSError, ValueError, RecursionError) as error:
         return print("refused:", error) or 3
 
 

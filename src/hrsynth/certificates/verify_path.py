@@ -27,19 +27,19 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import Any
 
-LENGTH = 5_000_000  # of a certificate's file
+PATH_CERTIFICATE_MAX_BYTES = 5_000_000  # of a certificate's file
 ONE = 1 << 96  # intervals are pairs of integers, in units of one over this
 Interval = tuple[int, int]
 Vector = list[Interval]
 
 
-class PathNotAccepted(Exception):
+class PathRejection(Exception):
     """Certificate that is not accepted: the reason."""
 
 
 def need(true: Any, why: str) -> None:
     if not true:
-        raise PathNotAccepted(why)
+        raise PathRejection(why)
 
 
 def number(text: Any) -> Fraction:
@@ -291,23 +291,26 @@ def once(pairs: Any) -> Any:  # an object of JSON; of two keys a reader may see 
     return dict(pairs)
 
 
-def verify(record: Any) -> str:  # what a certificate proves, in words; raises PathNotAccepted
+def verify(record: Any) -> str:  # what a certificate proves, in words; raises PathRejection
     try:
         need(isinstance(record, dict) and record.get("format") == "hrsynth-certificate-1", "this is no certificate")
         need(record["claim"] == "path", "it is not of a path: verify_certificate.py and verify_ranks.py check others")
         need(record["sha256"] == digest(record), "the file was changed: its digest differs")
         return path(record)
     except Exception as error:
-        raise error if isinstance(error, PathNotAccepted) else PathNotAccepted(f"no certificate: {error!r}") from None
+        raise error if isinstance(error, PathRejection) else PathRejection(f"no certificate: {error!r}") from None
 
 
 def main(name: str) -> int:  # prints the answer
     try:
         with open(name, encoding="utf-8") as file:
-            need(len(text := file.read(LENGTH + 1)) <= LENGTH, f"a file of more than {LENGTH} characters")
+            need(
+                len(text := file.read(PATH_CERTIFICATE_MAX_BYTES + 1)) <= PATH_CERTIFICATE_MAX_BYTES,
+                f"a file of more than {PATH_CERTIFICATE_MAX_BYTES} characters",
+            )
         print("accepted:", verify(json.loads(text, object_pairs_hook=once)))
         return 0
-    except (PathNotAccepted, OSError, ValueError, RecursionError) as error:
+    except (PathRejection, OSError, ValueError, RecursionError) as error:
         print("refused:", error)
         return 3
 

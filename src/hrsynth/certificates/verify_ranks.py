@@ -11,13 +11,13 @@ import sys
 PRIME, LENGTH, MOST = 2147483647, 5_000_000, 300  # of a file; of rows and columns
 
 
-class RanksNotAccepted(Exception):
+class RankRejection(Exception):
     """Certificate that is not accepted: the reason."""
 
 
 def need(true, why):
     if not true:
-        raise RanksNotAccepted(why)
+        raise RankRejection(why)
 
 
 def modular(rows, first):  # the ranks modulo the prime of the first columns and of all: where echelons begin
@@ -65,14 +65,14 @@ def once(pairs):  # an object of JSON; of two keys a reader may see one, Python 
     return dict(pairs)
 
 
-def verify(record):  # what a certificate proves, in words; raises RanksNotAccepted
+def verify(record):  # what a certificate proves, in words; raises RankRejection
     try:
         need(isinstance(record, dict) and record.get("format") == "hrsynth-certificate-1", "this is no certificate")
         need(record["sha256"] == digest(record), "the file was changed: its digest differs")
         need(record["claim"] == "ranks", "it is for another claim: verify_certificate.py, verify_path.py check those")
         return ranks(record)
     except Exception as error:
-        raise error if isinstance(error, RanksNotAccepted) else RanksNotAccepted(f"no certificate: {error!r}") from None
+        raise error if isinstance(error, RankRejection) else RankRejection(f"no certificate: {error!r}") from None
 
 
 def main(name):  # prints the answer
@@ -80,7 +80,7 @@ def main(name):  # prints the answer
         with open(name, encoding="utf-8") as file:
             need(len(text := file.read(LENGTH + 1)) <= LENGTH, f"a file of more than {LENGTH} characters")
         print("accepted:", verify(json.loads(text, object_pairs_hook=once)))
-    except (RanksNotAccepted, OSError, ValueError, RecursionError) as error:
+    except (RankRejection, OSError, ValueError, RecursionError) as error:
         return print("refused:", error) or 3
 
 

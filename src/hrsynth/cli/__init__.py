@@ -14,7 +14,7 @@ from . import completion, files, importing, lint, schema, studio
 from .analyses import QUESTIONS
 from .app import app as app
 from .catalog import catalog
-from .colour import close, say
+from .colour import close, print_text
 
 for question in QUESTIONS:
     question.add(app)
@@ -42,15 +42,15 @@ def main(arguments: list[str] | None = None) -> None:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(encoding="utf-8", errors="replace")
     if not os.path.isfile(__file__):
-        say(
+        print_text(
             f"hrsynth: {os.path.dirname(os.path.dirname(__file__))}: cannot run from an archive. Install it with pip.",
             err=True,
         )
         sys.exit(2)
-    sys.exit(execute(arguments))
+    sys.exit(run_command(arguments))
 
 
-def execute(arguments: list[str] | None = None) -> int:
+def run_command(arguments: list[str] | None = None) -> int:
     """Run a command and return its exit status."""
     try:
         with warnings.catch_warnings():
@@ -70,7 +70,9 @@ def execute(arguments: list[str] | None = None) -> int:
         if error.filename is not None or error.errno not in (errno.ENOSPC, errno.EIO, errno.EBADF):
             return _report_failure(error)
         close(sys.stdout)
-        say(f"hrsynth: cannot write to standard output: {error.strerror}. Free space, or write elsewhere.", err=True)
+        print_text(
+            f"hrsynth: cannot write to standard output: {error.strerror}. Free space, or write elsewhere.", err=True
+        )
         return 2
     except Exception as error:
         return _report_failure(error)
@@ -82,10 +84,10 @@ def _report_failure(error: Exception) -> int:
 
     if isinstance(error, HrsynthError):
         for line in error.lines():
-            say(f"hrsynth: {line}", err=True)
+            print_text(f"hrsynth: {line}", err=True)
         return error.exit_status
     if os.environ.get("HRSYNTH_DEBUG"):
         raise error
     what = " ".join(f"{type(error).__name__}: {error}".split())
-    say(f"hrsynth: internal error: {what}. Report it with the command and its files.", err=True)
+    print_text(f"hrsynth: internal error: {what}. Report it with the command and its files.", err=True)
     return 3

@@ -7,13 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from ..index import analyses, options
+from ..index import list_analyses, list_analysis_options
 from ..options import OUTPUT, Option, output
-from ..present.outputs import File, outputs_of
+from ..present.outputs import File, get_outputs
 from ..progress import on_progress
-from .colour import paint, say
+from .colour import paint, print_text
 from .commands import Group, add_command
-from .options import JSON, SOURCE, robot_of, split_names, told_radians, told_turns, warn
+from .options import JSON, SOURCE, load_robot, split_names, warn, warn_radians, warn_turns
 from .progress import Progress
 from .studio import PORT, serve
 
@@ -30,12 +30,12 @@ class Question:
 
     def add(self, app: Group) -> None:
         """Register the command."""
-        declared = analyses()[self.name]
-        files = outputs_of(self.name).files
-        given = options(self.name)
+        declared = list_analyses()[self.name]
+        files = get_outputs(self.name).files
+        given = list_analysis_options(self.name)
         own = [each for each in given if each.name != "seed"]
         own += [each for file in files for each in file.asks]
-        own += [_file_option(each) for each in files if each.option is not None]
+        own += [_make_file_option(each) for each in files if each.option is not None]
         drawn = FIGURE if any(each.drawn for each in files) else ()
         seed = [each for each in given if each.name == "seed" and declared["seeded"]]
         every = [SOURCE[0], *own, *self.more, *seed, *drawn, JSON, *SOURCE[1:]]
@@ -46,9 +46,9 @@ class Question:
         import hrsynth
 
         from ..description.files import require_other
-        from ..present.show import record, text
+        from ..present.show import format_record, text
 
-        files = {each: values.pop(each.option) for each in outputs_of(self.name).files if each.option is not None}
+        files = {each: values.pop(each.option) for each in get_outputs(self.name).files if each.option is not None}
         for each, path in files.items():
             each.require(path, values)
         if self.needs is not None and not json and not any(files.values()):
@@ -57,7 +57,7 @@ class Question:
         more = {each.record: None for each in files if each.record is not None}
         writers = []
         with Progress() as progress, on_progress(progress.tell):
-            mechanism = robot_of(values)
+            mechanism = load_robot(values)
             function = getattr(hrsynth, self.name)
             given = self._given_options(function, values)
             for each, path in files.items():
@@ -66,10 +66,10 @@ class Question:
                     require_other(path, source["robot"], mechanism.file)
                 each.require_drawable(path, mechanism, values | given)
             for option in ("at", "start", "goal"):
-                told_turns(option, values.get(option))
+                warn_turns(option, values.get(option))
             found = function(mechanism, **given)
             for option in ("cone", "noise"):
-                told_radians(option, values.get(option))
+                warn_radians(option, values.get(option))
             for each, path in files.items():
                 if path is None:
                     continue
@@ -85,14 +85,14 @@ class Question:
             write()
         written = {each.field: path for each, path in files.items() if each.field is not None}
         if json:
-            say(record(self.name, mechanism, {**found.to_dict(), **more, **written}))
+            print_text(format_record(self.name, mechanism, {**found.to_dict(), **more, **written}))
         elif self.shows is not None and not any(written.values()):
             self.shows(found, source=source, **values)
         else:
-            say(text(found), paint=paint)
+            print_text(text(found), paint=paint)
             for each, path in files.items():
                 if path is not None:
-                    say(each.sentence(path))
+                    print_text(each.sentence(path))
         motors = mechanism.proposed_motors if self.name in ("derive", "check") else None
         if motors is not None and motors not in getattr(found, "more", ()):
             warn(motors)
@@ -109,7 +109,7 @@ class Question:
         return given
 
 
-def _servable() -> None:
+def _require_server() -> None:
     """Raise ``MissingExtra`` if a library that serves pages is missing."""
     from ..present.studio.server import require_libraries
 
@@ -119,12 +119,12 @@ def _servable() -> None:
 def _serve_view(found: Any, source: dict[str, Any], port: int, open_: bool, **_: Any) -> None:
     """Serve a view until Ctrl-C, and open its page in the browser."""
     from ..present.show import text
-    from ..present.studio.server import view_server
+    from ..present.studio.server import serve_view
 
-    serve(view_server(found, port, open_, source), f"{text(found)}\nThe view")
+    serve(serve_view(found, port, open_, source), f"{text(found)}\nThe view")
 
 
-def _file_option(file: File) -> Option:
+def _make_file_option(file: File) -> Option:
     """Return the option of a file to which a result can be written."""
     if file.option == "output":
         return output(file.help)
@@ -139,7 +139,7 @@ VIEW = Question(
     "view",
     (PORT, Option("open_", "Open the page in the browser.", None, bool, True, ("--open/--no-open",))),
     _serve_view,
-    _servable,
+    _require_server,
 )
-QUESTIONS = tuple(VIEW if name == VIEW.name else Question(name) for name in analyses())
+QUESTIONS = tuple(VIEW if name == VIEW.name else Question(name) for name in list_analyses())
 """Commands in the order of the help."""

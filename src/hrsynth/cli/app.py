@@ -3,7 +3,7 @@
 from .commands import Group
 
 
-def _version() -> str:
+def _print_version() -> str:
     from ..version import __version__
 
     return __version__
@@ -12,5 +12,5 @@ def _version() -> str:
 app = Group(
     "hrsynth",
     "Hidden robots of parallel robots that are controlled by observing the directions of their legs.",
-    _version,
+    _print_version,
 )

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
 from ..options import NEEDED, Option, flag, output
 from ..records import Head, Word
-from .colour import say
+from .colour import print_text
 from .commands import Group, add_command
 from .options import JSON, warn
 from .progress import Progress
@@ -161,7 +161,7 @@ class CatalogBuild(Head):
     stale: NotRequired[list[str]]
 
 
-class Differing(TypedDict):
+class DerivationDifference(TypedDict):
     """A derivation that differs from the catalog entry."""
 
     key: str
@@ -175,13 +175,13 @@ class CatalogSite(Head):
     architectures: int
     pages: int
     now: int
-    differ: list[Differing]
+    differ: list[DerivationDifference]
 
 
-def _say(command: str, fields: dict[str, Any], text: str, json: bool) -> None:
-    from ..present.show import record
+def _print_result(command: str, fields: dict[str, Any], text: str, json: bool) -> None:
+    from ..present.show import format_record
 
-    say(record(f"catalog {command}", None, fields) if json else text)
+    print_text(format_record(f"catalog {command}", None, fields) if json else text)
 
 
 def build(
@@ -205,11 +205,11 @@ def build(
             raise BadRequest(f"{option} {'with' if check else 'without'} --check", remedy=f"Omit {option}.")
     if check:
         from ..catalog.build import check as run
-        from ..catalog.store import shipped_folder
+        from ..catalog.store import locate_shipped_folder
 
         with Progress(counted=True) as progress:
             stale = run(
-                output or shipped_folder(),
+                output or locate_shipped_folder(),
                 groups or [],
                 workers=workers,
                 cluster=cluster,
@@ -218,14 +218,14 @@ def build(
                 tell=progress.count,
             )
         if json or not stale:
-            _say("build", {"stale": stale}, "not stale", json)
+            _print_result("build", {"stale": stale}, "not stale", json)
         if stale:
             raise CatalogStale(stale)
         return
     from ..catalog.build import build as make
     from ..present.text.catalog import describe_built
 
-    target = _target(output)
+    target = _choose_target(output)
     with Progress(counted=True) as progress:
         done = [
             each.to_dict()
@@ -239,18 +239,18 @@ def build(
                 tell=progress.count,
             )
         ]
-    _say("build", {"groups": done}, describe_built(done), json)
+    _print_result("build", {"groups": done}, describe_built(done), json)
 
 
-def entries(kept: str | None, json: bool, **asked: Any) -> None:
+def print_entries(kept: str | None, json: bool, **asked: Any) -> None:
     """List the architectures that fit."""
-    from ..catalog.query import count, covered
+    from ..catalog.query import count, list_covered_groups
     from ..catalog.store import ALL
-    from ..present.text.catalog import entries as written
+    from ..present.text.catalog import format_entries as written
 
     kept = kept or ALL
-    found, total, groups = _asked(kept, asked), count(kept, **asked), covered(kept, **asked)
-    _say(
+    found, total, groups = _select_catalog(kept, asked), count(kept, **asked), list_covered_groups(kept, **asked)
+    _print_result(
         "list",
         {"total": total, "groups": groups, "entries": [dict(each) for each in found] if json else []},
         "" if json else written(found.records, total, groups),
@@ -258,33 +258,33 @@ def entries(kept: str | None, json: bool, **asked: Any) -> None:
     )
 
 
-def _asked(kept: str | None, asked: dict[str, Any]) -> Catalog:
+def _select_catalog(kept: str | None, asked: dict[str, Any]) -> Catalog:
     """Return the architectures that fit; raise ``BadRequest`` for an empty search or one that none can fit."""
     from ..catalog import load
     from ..errors import BadRequest
 
     if asked["text"] is not None and not asked["text"].strip():
-        raise BadRequest("--text: empty", remedy=f"Search for a name or a text, such as {_names()[0]}.")
+        raise BadRequest("--text: empty", remedy=f"Search for a name or a text, such as {_list_names()[0]}.")
     found = load(kept, **asked)
     if not found:
         _require_known(kept, asked)
     return found
 
 
-def _names() -> list[str]:
+def _list_names() -> list[str]:
     """Return the names under which robots are known."""
-    from ..catalog.known import aliases
+    from ..catalog.known import list_aliases
 
-    return sorted({name for names in aliases().values() for name in names.split(", ")})
+    return sorted({name for names in list_aliases().values() for name in names.split(", ")})
 
 
 def _require_known(kept: str | None, asked: dict[str, Any]) -> None:
     """Raise ``BadRequest`` for a value that no entry of the catalog has."""
     from ..catalog import load
-    from ..catalog.query import groups_of, values
+    from ..catalog.query import list_field_values, list_groups
     from ..errors import BadRequest
 
-    groups = groups_of(kept)
+    groups = list_groups(kept)
     named = {"group": groups, "verdict": VERDICTS}
     for name, field in (
         ("group", ""),
@@ -295,45 +295,45 @@ def _require_known(kept: str | None, asked: dict[str, Any]) -> None:
         ("modes", "modes_bound"),
     ):
         if asked[name] is not None and asked[name] not in (
-            known := named[name] if name in named else values(field, kept)
+            known := named[name] if name in named else list_field_values(field, kept)
         ):
             raise BadRequest(f"--{name}: no such entry in the catalog", asked[name], list(map(str, sorted(known))))
     if asked["legs"] is not None and not load(kept, group=tuple(groups), legs=asked["legs"]):
         raise BadRequest(
             "--legs: no such entry in the catalog",
             asked["legs"],
-            list(map(str, values("legs", kept))),
+            list(map(str, list_field_values("legs", kept))),
             remedy="Give a number or a pattern such as 3-R*RR, PUS, 6-*.",
         )
     if asked["text"] is not None and not load(kept, group=tuple(groups), text=asked["text"]):
-        near = {name.casefold(): name for names in _names() for name in (names, *names.split())}
+        near = {name.casefold(): name for names in _list_names() for name in (names, *names.split())}
         close = get_close_matches(asked["text"].casefold(), near, cutoff=0.5)
         raise BadRequest(
             f"--text {asked['text']}: not found in any field or name of the catalog",
-            remedy=f"Search for another text, such as {' or '.join([near[name] for name in close] or _names()[:3])}.",
+            remedy=f"Search for another text, such as {' or '.join([near[name] for name in close] or _list_names()[:3])}.",
         )
 
 
 def show(word: str, output: str | None, kept: str | None, json: bool) -> None:
     """Show one architecture."""
-    from ..catalog.entry import smallest_sets
-    from ..description import save, targets
+    from ..catalog.entry import derive_smallest_sets
+    from ..description import list_save_targets, save
     from ..errors import BadRequest
-    from ..present.text.catalog import entry
+    from ..present.text.catalog import format_entry
 
     if output is not None:
-        targets(output)
+        list_save_targets(output)
     with Progress():
-        found = _of_word(word, kept)
+        found = _find_shown(word, kept)
         if output is not None:
             if "refused" in found.record:
                 raise BadRequest(f"{word}: refused: {found.record['refused']}", remedy="Choose one with a verdict.")
             robot = found.mechanism()
-        smallest = [] if found.studied is None else smallest_sets(found.record, found.studied())
+        smallest = [] if found.studied is None else derive_smallest_sets(found.record, found.studied())
     if output is not None:
         for warning in save(robot, output):
             warn(str(warning))
-    _say(
+    _print_result(
         "show",
         {
             "entry": dict(found.record),
@@ -342,7 +342,7 @@ def show(word: str, output: str | None, kept: str | None, json: bool) -> None:
             "smallest": smallest,
             "file": output,
         },
-        entry(found.record, found.drawn, found.note, smallest)
+        format_entry(found.record, found.drawn, found.note, smallest)
         + ("" if output is None else f"\n\nThe robot is written to {output}."),
         json,
     )
@@ -360,7 +360,7 @@ class _Shown:
     studied: Callable[[], Mechanism] | None = None
 
 
-def _no_geometry(name: str) -> Mechanism:
+def _refuse_geometry(name: str) -> Mechanism:
     from ..errors import BadRequest
 
     raise BadRequest(
@@ -369,39 +369,39 @@ def _no_geometry(name: str) -> Mechanism:
     )
 
 
-def _of_word(text: str, kept: str | None) -> _Shown:
+def _find_shown(text: str, kept: str | None) -> _Shown:
     from ..catalog import load
     from ..catalog.architecture_key import parse
-    from ..catalog.drawing import drawing
-    from ..catalog.entry import model
-    from ..catalog.geometry import mechanism
+    from ..catalog.drawing import draw_architecture
+    from ..catalog.entry import choose_study_model
+    from ..catalog.geometry import build_mechanism
     from ..catalog.store import ALL
 
     if text.isalnum() and text in (every := load(kept or ALL)) and "choices" in every[text]:
-        return _Shown(every[text], "", "", partial(_no_geometry, text))
-    word, others = _word(text, kept)
+        return _Shown(every[text], "", "", partial(_refuse_geometry, text))
+    word, others = _parse_word(text, kept)
     architecture = parse(word)
-    record, note = _known_record(str(architecture), kept)
+    record, note = _find_record(str(architecture), kept)
     return _Shown(
         record,
-        drawing(architecture),
+        draw_architecture(architecture),
         "; ".join(each for each in (note, others) if each),
-        lambda: mechanism(architecture, record.get("attempt", 0)),
-        lambda: mechanism(model(architecture), record.get("attempt", 0)),
+        lambda: build_mechanism(architecture, record.get("attempt", 0)),
+        lambda: build_mechanism(choose_study_model(architecture), record.get("attempt", 0)),
     )
 
 
-def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **asked: Any) -> None:
+def build_site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **asked: Any) -> None:
     """Write the pages of the architectures that fit; without criteria of those with equal legs."""
     from ..catalog import Catalog
-    from ..catalog.known import equal_legs
-    from ..catalog.site import site as run
+    from ..catalog.known import has_equal_legs
+    from ..catalog.site import write_site as run
     from ..errors import BadRequest
     from ..present.text.catalog import describe_site
 
-    found = _asked(kept, asked)
+    found = _select_catalog(kept, asked)
     if all(value is None for value in asked.values()):
-        found, every = Catalog([each for each in found if equal_legs(each["key"])]), len(found)
+        found, every = Catalog([each for each in found if has_equal_legs(each["key"])]), len(found)
         if len(found) < every:
             warn(
                 f"{every - len(found):,} architectures with unequal legs get no page; "
@@ -416,13 +416,13 @@ def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **
     if done.differ:
         word, derived = done.differ[0]
         warn(f"{len(done.differ)} derivations differ from the catalog, the first: {word}, derived {derived}")
-    _say("site", done.to_dict(), describe_site(done.to_dict()), json)
+    _print_result("site", done.to_dict(), describe_site(done.to_dict()), json)
 
 
-def _word(text: str, kept: str | None) -> tuple[str, str]:
+def _parse_word(text: str, kept: str | None) -> tuple[str, str]:
     """Return the key of an architecture, given as key, name or legs, and a note on others of that name."""
     from ..catalog.architecture_key import parse
-    from ..catalog.known import alias
+    from ..catalog.known import find_alias
     from ..catalog.query import find_named
     from ..errors import BadRequest
 
@@ -439,28 +439,28 @@ def _word(text: str, kept: str | None) -> tuple[str, str]:
             ) from None
     word = found[0]["key"]
     more = [f"{len(found)} have this name: {', '.join(each['key'] for each in found[1:4])} …"] if found[1:] else []
-    return word, "; ".join([*filter(None, [alias(word)]), *more])
+    return word, "; ".join([*filter(None, [find_alias(word)]), *more])
 
 
-def _known_record(word: str, kept: str | None) -> tuple[Any, str]:
+def _find_record(word: str, kept: str | None) -> tuple[Any, str]:
     """Return the entry of a key, and a note if it is not from the catalog."""
     from ..catalog import load
     from ..catalog.architecture_key import parse
-    from ..catalog.build import architectures, make_records
+    from ..catalog.build import list_architectures, make_records
     from ..catalog.groups import group
-    from ..catalog.query import groups_of
-    from ..catalog.store import shipped_folder
+    from ..catalog.query import list_groups
+    from ..catalog.store import locate_shipped_folder
 
     own = group(parse(word))
-    if kept is not None or shipped_folder().groups():
-        found = load(kept, group=own if own in groups_of(kept) else None)
+    if kept is not None or locate_shipped_folder().groups():
+        found = load(kept, group=own if own in list_groups(kept) else None)
         if word in found:
             return found[word], ""
-    ((_, line),) = make_records(architectures().entry, own, [word])
+    ((_, line),) = make_records(list_architectures().entry, own, [word])
     return javascript.loads(line), "not in the catalog, analysed now"
 
 
-def _target(output: str | None) -> Path:
+def _choose_target(output: str | None) -> Path:
     """Return the target of a build: the given one, or ``catalog/`` of the checkout; never an installed package."""
     from importlib import resources
 
@@ -503,7 +503,7 @@ COMMANDS = (
             Option("seed", "Seed of --sample.", None, int, 0, low=0),
         ),
     ),
-    ("list", "List the architectures that fit.", entries, (*FILTER, KEPT, JSON)),
+    ("list", "List the architectures that fit.", print_entries, (*FILTER, KEPT, JSON)),
     (
         "show",
         "Show one architecture, drawn and in full; one that is not in the catalog is analysed.",
@@ -525,7 +525,7 @@ COMMANDS = (
         "site",
         "Write web pages of the architectures that fit: a list with filters, drawings, derivations, robot files; "
         "no server needed.",
-        site,
+        build_site,
         (
             output("A new or empty folder, or an older site, which is replaced.", "DIR", NEEDED),
             *FILTER,

@@ -32,7 +32,7 @@ _PART = re.compile(r"^([A-Z][^:\n]*)(?=:$)", re.MULTILINE)
 _TITLE = re.compile(r"^([a-zA-Z][^ ]*(?: [^ ]+){0,3})(  +)(?=\S)", re.MULTILINE)
 
 
-def say(text: str, *, err: bool = False, paint: Callable[[str], str] = str) -> None:
+def print_text(text: str, *, err: bool = False, paint: Callable[[str], str] = str) -> None:
     """Print a text to standard output, painted, or to standard error, which may be closed."""
     if not err:
         print(paint(escape_steering(text)), flush=True)
@@ -43,7 +43,7 @@ def say(text: str, *, err: bool = False, paint: Callable[[str], str] = str) -> N
         close(sys.stderr)
 
 
-def overwrite(text: str) -> None:
+def replace_line(text: str) -> None:
     """Overwrite the current line of standard error, and return to its start."""
     with contextlib.suppress(OSError, ValueError):
         print(f"\r{escape_steering(text)}\x1b[K", end="\r", file=sys.stderr, flush=True)
@@ -55,19 +55,19 @@ def close(stream: object) -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())  # type: ignore[attr-defined]
 
 
-def wants_colour() -> bool:
+def may_use_colour() -> bool:
     """Return True if standard output and the user accept colours (https://no-color.org)."""
     return not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb" and sys.stdout.isatty()
 
 
 def paint_help(text: str) -> str:
     """Print the titles of a help in bold, if colours are wanted."""
-    return _PART.sub("\x1b[1m\\1\x1b[0m", text) if wants_colour() else text
+    return _PART.sub("\x1b[1m\\1\x1b[0m", text) if may_use_colour() else text
 
 
 def paint(text: str) -> str:
     """Paint a result: dim names of rows and coloured verdicts, if colours are wanted."""
-    if not wants_colour():
+    if not may_use_colour():
         return text
     for name, words in VERDICTS.items():
         shown = rf"(?:(?<=  )|(?<=: ))({'|'.join(words)})(?=[ ,]|$)"

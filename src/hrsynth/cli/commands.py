@@ -11,13 +11,13 @@ from typing import Any
 
 from ..errors import BadRequest
 from ..options import NEEDED, OBSERVATION, OUTPUT, OVERRIDES, OWN, Option
-from .colour import paint_help, say
+from .colour import paint_help, print_text
 
 HELP = ("-h", "--help")
 HELP_ROW = (", ".join(HELP), "Show this message and exit.")
 POSES = ("--at", "--goal")
 """Options of the pose of a command: the robot's pose, or the goal of runs and paths."""
-LIKE_A_FLAG = 0.7
+OPTION_SIMILARITY_MIN = 0.7
 """Least similarity of a misspelt option."""
 
 
@@ -42,7 +42,7 @@ class DeclaredCommand:
         """Run the command on the words after its name, or show its help; ``beside``: the other commands."""
         values = self.values(words, beside)
         if values is None:
-            say(self.help_text(), paint=paint_help)
+            print_text(self.help_text(), paint=paint_help)
         else:
             self.run(**values)
 
@@ -87,17 +87,17 @@ class DeclaredCommand:
                 raise BadRequest(f"{self.name} has no option {name}", remedy=f"Use {usual} for the pose.")
             if takers := [each.name for each in beside if any(name in option.names for option in each.options)]:
                 raise BadRequest(f"{self.name} has no option {name}", remedy=f"Omit it, or use {', '.join(takers)}.")
-            close = get_close_matches(name, flags, cutoff=LIKE_A_FLAG) or sorted(flags)
+            close = get_close_matches(name, flags, cutoff=OPTION_SIMILARITY_MIN) or sorted(flags)
             raise BadRequest(f"{self.name} has no option {name}", remedy=f"Try {', '.join(close)}.")
         given: dict[str, list[Any]] = vars(found)
         plain += rest
         for option in self.options:
             if option.argument and plain:
-                count = len(plain) if option.several else 1
+                count = len(plain) if option.is_repeatable else 1
                 given[option.name], plain = plain[:count], plain[count:]
         # Python 3.11 and 3.12 make [] of the value "--"
         for option in self.options:
-            if option.names_several and len(texts := given.get(option.name, ())) > 1:
+            if option.has_several_names and len(texts := given.get(option.name, ())) > 1:
                 raise BadRequest(f"{option.names[0]}: repeated", remedy=f"Write {option.names[0]} {','.join(texts)}.")
         read = {
             each: [each.read("--" if value == [] else value) for value in given[each.name]]
@@ -110,7 +110,7 @@ class DeclaredCommand:
         if missing:
             raise BadRequest(f"{self.name}: {' and '.join(missing)} missing", remedy=f"See {self.path} -h.")
         return {
-            each.name: each.default if each not in read else read[each] if each.several else read[each][-1]
+            each.name: each.default if each not in read else read[each] if each.is_repeatable else read[each][-1]
             for each in self.options
         }
 
@@ -119,13 +119,13 @@ class DeclaredCommand:
         arguments = [each for each in self.options if each.argument]
         needed = [each.shown.split(", ")[-1] for each in self.options if each.default is NEEDED and not each.argument]
         parts = [
-            *_head(self.path, [*(each.value for each in arguments), *needed, "[OPTIONS]"], self.help),
-            *_section("Arguments", [(each.value, each.told) for each in arguments]),
+            *_format_head(self.path, [*(each.value for each in arguments), *needed, "[OPTIONS]"], self.help),
+            *_format_section("Arguments", [(each.value, each.told) for each in arguments]),
         ]
         for group in (OWN, OBSERVATION, OUTPUT, OVERRIDES):
             rows = [(each.shown, each.told) for each in self.options if each.group == group and not each.argument]
-            parts += _section(group, rows + [HELP_ROW] * (group == OUTPUT))
-        return "\n\n".join([*parts, *_examples(self.path, self.examples)])
+            parts += _format_section(group, rows + [HELP_ROW] * (group == OUTPUT))
+        return "\n\n".join([*parts, *_format_examples(self.path, self.examples)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,9 +142,9 @@ class Group:
         """Run the command named by the first word; without one show the help."""
         name, *rest = words or HELP
         if name in HELP:
-            say(self.help_text(), paint=paint_help)
+            print_text(self.help_text(), paint=paint_help)
         elif name == "--version" and self.version is not None:
-            say(f"{self.path} {self.version()}")
+            print_text(f"{self.path} {self.version()}")
         elif name.startswith("-"):
             raise BadRequest("unknown option", name, [*HELP, *["--version"] * (self.version is not None)])
         elif name not in self.commands:
@@ -161,10 +161,10 @@ class Group:
         version = [] if self.version is None else [("--version", "Print the version.")]
         return "\n\n".join(
             [
-                *_head(self.path, ["[OPTIONS]", "COMMAND", "[ARGS]..."], self.help),
-                *_section("Options", [*version, HELP_ROW]),
-                *_section("Commands", [(name, each.help) for name, each in self.commands.items()]),
-                *_examples(self.path, self.examples),
+                *_format_head(self.path, ["[OPTIONS]", "COMMAND", "[ARGS]..."], self.help),
+                *_format_section("Options", [*version, HELP_ROW]),
+                *_format_section("Commands", [(name, each.help) for name, each in self.commands.items()]),
+                *_format_examples(self.path, self.examples),
             ]
         )
 
@@ -182,12 +182,12 @@ def add_command(
     group.commands[name] = DeclaredCommand(f"{group.path} {name}", help, options, run, examples, record)
 
 
-def _examples(path: str, examples: Sequence[str]) -> list[str]:
+def _format_examples(path: str, examples: Sequence[str]) -> list[str]:
     """Return the section of examples, empty without examples."""
     return ["\n".join(["Examples:", *(f"  {path} {each}" for each in examples)])] if examples else []
 
 
-def _width() -> int:
+def _measure_width() -> int:
     """Return the width of a help in columns."""
     return max(min(shutil.get_terminal_size().columns, 100) - 2, 50)
 
@@ -198,12 +198,14 @@ def _fill_lines(text: str, width: int, first: str, more: str) -> str:
     )
 
 
-def _head(path: str, words: Sequence[str], help: str) -> tuple[str, str]:
+def _format_head(path: str, words: Sequence[str], help: str) -> tuple[str, str]:
     usage = f"Usage: {path} "
-    return _fill_lines(" ".join(words), _width(), usage, " " * len(usage)), _fill_lines(help, _width(), "  ", "  ")
+    return _fill_lines(" ".join(words), _measure_width(), usage, " " * len(usage)), _fill_lines(
+        help, _measure_width(), "  ", "  "
+    )
 
 
-def _section(title: str, rows: Sequence[tuple[str, str]]) -> list[str]:
+def _format_section(title: str, rows: Sequence[tuple[str, str]]) -> list[str]:
     """Return a title with its aligned rows, empty without rows."""
     if not rows:
         return []
@@ -214,5 +216,5 @@ def _section(title: str, rows: Sequence[tuple[str, str]]) -> list[str]:
         if len(name) > column - 2:
             lines.append(f"  {name}")
             first = apart
-        lines.append(_fill_lines(told, _width(), first, apart).rstrip())
+        lines.append(_fill_lines(told, _measure_width(), first, apart).rstrip())
     return ["\n".join(lines)]

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from ..options import NEEDED, Option
-from .colour import say
+from .colour import print_text
 from .commands import Group, add_command
-from .options import shipped_names
+from .options import list_shipped_names
 
 EXAMPLE = "example:"
 WORDS = "words"
@@ -41,16 +41,16 @@ complete -c hrsynth -a '(__hrsynth_words)'""",
 }
 
 
-def candidates(root: Any, typed: Sequence[str]) -> list[str]:
+def list_completions(root: Any, typed: Sequence[str]) -> list[str]:
     """Return completions of the last typed word, which may be empty."""
     *before, last = typed or [""]
     command, used = root, 0
     while used < len(before) and before[used] in getattr(command, "commands", {}):
         command, used = command.commands[before[used]], used + 1
-    return [each for each in _next(command, before[used:], last) if each.startswith(last)]
+    return [each for each in _list_next(command, before[used:], last) if each.startswith(last)]
 
 
-def _next(command: Any, before: Sequence[str], last: str) -> Iterable[str]:
+def _list_next(command: Any, before: Sequence[str], last: str) -> Iterable[str]:
     """Return commands of a group, values of the option before, options, or values of the argument."""
     if hasattr(command, "commands"):
         return ["--help", "--version"] if last.startswith("-") else list(command.commands)
@@ -58,16 +58,16 @@ def _next(command: Any, before: Sequence[str], last: str) -> Iterable[str]:
     by_name = {name: each for each in options for name in each.names}
     named = by_name.get(before[-1]) if before else None
     if named is not None and named.kind is not bool:
-        return _words(named, last)
+        return _list_values(named, last)
     if last.startswith("-"):
         return ["--help", *(part for name in by_name for part in name.split("/") if part.startswith("--"))]
-    return [word for each in options if each.argument for word in _words(each, last)]
+    return [word for each in options if each.argument for word in _list_values(each, last)]
 
 
-def _words(option: Option, last: str) -> Iterable[str]:
+def _list_values(option: Option, last: str) -> Iterable[str]:
     """Return the values of an option; for robots also ``example:NAME``, once begun."""
     words = option.words() if callable(option.words) else option.words
-    if option.words is shipped_names and last and EXAMPLE.startswith(last[: len(EXAMPLE)]):
+    if option.words is list_shipped_names and last and EXAMPLE.startswith(last[: len(EXAMPLE)]):
         from ..description import list_examples
 
         return [*words, *(f"{EXAMPLE}{name}" for name in list_examples())]
@@ -82,10 +82,10 @@ def add(app: Group) -> None:
         from ..errors import BadRequest
 
         if shell == WORDS:
-            for each in candidates(app, typed or []):
-                say(each)
+            for each in list_completions(app, typed or []):
+                print_text(each)
         elif shell in SCRIPTS:
-            say(SCRIPTS[shell])
+            print_text(SCRIPTS[shell])
         else:
             raise BadRequest("unknown shell", shell, tuple(SCRIPTS))
 

@@ -7,9 +7,9 @@ from typing import Any, NotRequired, TypedDict
 from ..options import NEEDED, OUTPUT, Option, flag, output
 from ..records import Head, OfRobot, Platform
 from . import options
-from .colour import say
+from .colour import print_text
 from .commands import Group, add_command
-from .options import JSON, SOURCE, robot_of, warn
+from .options import JSON, SOURCE, load_robot, warn
 from .progress import Progress
 
 
@@ -50,27 +50,27 @@ class Verify(Head):
     proved: str
 
 
-def robots(examples: bool, json: bool) -> None:
+def print_robots(examples: bool, json: bool) -> None:
     """Print a table of the shipped robots, or of those of the package example-robot-data."""
     from ..description import list_examples as found
     from ..description import list_robots
     from ..families.table import ROBOTS
     from ..mechanism.notation import parse
-    from ..present.show import record
-    from ..present.text.tables import table
+    from ..present.show import format_record
+    from ..present.text.tables import format_table
 
     if examples:
         if json:
-            say(
-                record(
+            print_text(
+                format_record(
                     "robots",
                     None,
                     {"robots": [{"name": f"example:{name}", "file": str(file)} for name, file in found().items()]},
                 )
             )
         else:
-            say(
-                table(
+            print_text(
+                format_table(
                     [(f"example:{name}", file.suffix[1:], file.parts[-3]) for name, file in found().items()],
                     ("name", "format", "from example-robot-data"),
                 )
@@ -89,10 +89,10 @@ def robots(examples: bool, json: bool) -> None:
             }
             for each in ROBOTS
         ]
-        say(record("robots", None, {"robots": rows}))
+        print_text(format_record("robots", None, {"robots": rows}))
     else:
-        say(
-            table(
+        print_text(
+            format_table(
                 [(each.name, str(parse(each.architecture)), str(each.dof), each.section) for each in ROBOTS],
                 ("name", "architecture", "dof", "source"),
             )
@@ -101,18 +101,18 @@ def robots(examples: bool, json: bool) -> None:
 
 def convert(target: str | None, output: str | None, to: str | None, meshes: str, json: bool, **source: Any) -> None:
     """Write a robot in another format."""
-    from ..description import save, targets
+    from ..description import list_save_targets, save
     from ..description.files import require_other
     from ..errors import BadRequest
-    from ..present.show import record
+    from ..present.show import format_record
 
     if (target is None) is (output is None):
         problem = f"convert: two outputs, {target} and {output}" if target else "convert: OUT missing"
         raise BadRequest(problem, remedy="Give OUT or -o OUT.")
     target = str(target or output)
-    files, name = [str(file) for file in targets(target, to)], source["robot"]
+    files, name = [str(file) for file in list_save_targets(target, to)], source["robot"]
     with Progress():
-        mechanism = robot_of(source)
+        mechanism = load_robot(source)
         for file in files:
             require_other(file, name, mechanism.file)
         lost = [str(warning) for warning in save(mechanism, target, to, meshes=meshes)]
@@ -125,8 +125,8 @@ def convert(target: str | None, output: str | None, to: str | None, meshes: str,
         "joints": len(mechanism.joints),
         "warnings": lost,
     }
-    say(
-        record("convert", mechanism, fields)
+    print_text(
+        format_record("convert", mechanism, fields)
         if json
         else f"{mechanism.name} with {fields['links']} links and {fields['joints']} joints, platform "
         f"{mechanism.platform_words}, written to {' and '.join(files)}."
@@ -137,12 +137,12 @@ def verify(certificate: str, robot: str | None, json: bool) -> None:
     """Check a certificate with integers and fractions only."""
     from ..certificates import verify as checked
     from ..description import load
-    from ..present.show import record
+    from ..present.show import format_record
 
     mechanism = None if robot is None else load(robot)
     proved = checked(certificate, mechanism)
     fields = {"file": certificate, "accepted": True, "proved": proved}
-    say(record("verify", mechanism, fields) if json else f"accepted: {proved}")
+    print_text(format_record("verify", mechanism, fields) if json else f"accepted: {proved}")
 
 
 def add(app: Group) -> None:
@@ -153,7 +153,9 @@ def add(app: Group) -> None:
         "Check a certificate of modes, derive or path, using only integers and fractions.",
         (
             Option("certificate", "Certificate file.", "FILE", default=NEEDED, argument=True),
-            Option("robot", "Check that its geometry is that of this robot.", "ROBOT", words=options.shipped_names),
+            Option(
+                "robot", "Check that its geometry is that of this robot.", "ROBOT", words=options.list_shipped_names
+            ),
             JSON,
         ),
         verify,
@@ -168,7 +170,7 @@ def add(app: Group) -> None:
             flag("examples", "List the robots of the package example-robot-data instead: legged robots, arms, hands."),
             JSON,
         ),
-        robots,
+        print_robots,
         ("", "--examples"),
         Robots,
     )

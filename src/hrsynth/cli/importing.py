@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from ..characters import escape_steering
 from ..options import NEEDED, OBSERVATION, Option, flag, output
 from ..records import OfRobot
-from .colour import say
+from .colour import print_text
 from .commands import Group, add_command
-from .options import JSON, SOURCE, quiet_robot_of, robot_of, warn
+from .options import JSON, SOURCE, load_robot, load_robot_silently, warn
 from .progress import Progress
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..mechanism.observation import Observation
 
 T = TypeVar("T")
-SHOWN = 20
+IMPORT_CHOICES_PRINTED_MAX = 20
 """Largest number of listed choices; others are entered by name."""
 
 
@@ -41,14 +41,14 @@ class Import(OfRobot):
     warnings: list[str]
 
 
-def importing(target: str, observe: str | None, yes: bool, view: bool, json: bool, **source: Any) -> None:
+def run_import(target: str, observe: str | None, yes: bool, view: bool, json: bool, **source: Any) -> None:
     """Read a robot with overrides or assumptions, and write it."""
-    from ..description import file_of, save
+    from ..description import find_robot_file, save
     from ..description.files import require_other, require_writable
     from ..errors import BadRequest
-    from ..present.show import record
+    from ..present.show import format_record
 
-    path = file_of(source["robot"])
+    path = find_robot_file(source["robot"])
     if Path(target).suffix.lower() != ".urdf":
         raise BadRequest(f"--output {target}: not a .urdf file", remedy="Use hrsynth convert for others.")
     require_writable(target)
@@ -60,7 +60,7 @@ def importing(target: str, observe: str | None, yes: bool, view: bool, json: boo
     with Progress():
         mechanism = _read(source, observe, tell=not asking)
         lost = [str(warning) for warning in save(mechanism, target, "native")]
-    motors = [name for name, joint in mechanism.joints.items() if joint.actuated]
+    motors = [name for name, joint in mechanism.joints.items() if joint.is_actuated]
     notes = [str(note) for note in mechanism.notes]
     if not motors:
         notes.append(
@@ -79,13 +79,13 @@ def importing(target: str, observe: str | None, yes: bool, view: bool, json: boo
             "joints": len(mechanism.joints),
             "base": mechanism.base,
             "motors": motors,
-            "observed": {leg: seen.link for leg, seen in _segments(mechanism).items()},
+            "observed": {leg: seen.link for leg, seen in _list_segments(mechanism).items()},
             "notes": notes,
             "warnings": lost,
         }
-        say(record("import", mechanism, fields))
+        print_text(format_record("import", mechanism, fields))
     else:
-        say(
+        print_text(
             f"{mechanism.name} with {len(mechanism.links)} links and {len(mechanism.joints)} joints, platform "
             f"{mechanism.platform_words}, written to {target}.\nSame without dialog: {again}"
         )
@@ -101,22 +101,22 @@ def repeat_command(source: dict[str, Any], observe: str | None, target: str) -> 
 
 def _read(source: dict[str, Any], observe: str | None, *, tell: bool) -> Mechanism:
     """Read the mechanism with the overrides; ``tell``: print its notes."""
-    from ..description.overrides import names, observe_links
+    from ..description.overrides import observe_links, parse_names
 
-    mechanism = (robot_of if tell else quiet_robot_of)(dict(source))
+    mechanism = (load_robot if tell else load_robot_silently)(dict(source))
     mechanism.require_platform()
-    return mechanism if observe is None else observe_links(mechanism, names(observe) or ())
+    return mechanism if observe is None else observe_links(mechanism, parse_names(observe) or ())
 
 
-def _segments(mechanism: Mechanism) -> dict[str, Observation]:
+def _list_segments(mechanism: Mechanism) -> dict[str, Observation]:
     """Return the observed segment of each leg that has one."""
     from ..errors import HrsynthError
     from ..mechanism.legs import decompose
-    from ..mechanism.normal import normal_form
-    from ..mechanism.sensors import defaults_of
+    from ..mechanism.normal import reduce_to_normal_form
+    from ..mechanism.sensors import list_default_segments
 
     try:
-        return defaults_of(decompose(normal_form(mechanism).mechanism))
+        return list_default_segments(decompose(reduce_to_normal_form(mechanism).mechanism))
     except HrsynthError:
         return {}
 
@@ -135,7 +135,7 @@ def _ask_all(
             if wanted is False:
                 break
     except (EOFError, KeyboardInterrupt) as error:
-        say("")
+        print_text("")
         status = 2 if isinstance(error, EOFError) else 130
     warn("nothing written")
     raise SystemExit(status)
@@ -175,7 +175,7 @@ class _Dialog:
     def _choices(self) -> ImportChoices:
         """Return the open choices of the file with the answers so far."""
         from ..description.assembly.choices import choices
-        from ..description.overrides import Overrides, names
+        from ..description.overrides import Overrides, parse_names
 
         given = self.source
         with Progress():
@@ -184,7 +184,7 @@ class _Dialog:
                 Overrides(
                     given["base"],
                     None,
-                    names(given["motors"]),
+                    parse_names(given["motors"]),
                     tuple(given["close"] or ()),
                     tuple(name for name in given["freeze"].split(",") if name),
                     unit=given["unit"],
@@ -201,37 +201,37 @@ class _Dialog:
         except HrsynthError as error:
             if not self.asked:
                 raise
-            say("\n".join(["", *error.lines(), "The file cannot be read this way. Answer again.", ""]))
+            print_text("\n".join(["", *error.lines(), "The file cannot be read this way. Answer again.", ""]))
             return None
 
     def _show_file(self, found: ImportChoices) -> None:
         kinds: dict[str, int] = {}
         for joint in found.joints:
-            kinds[_word(joint)] = kinds.get(_word(joint), 0) + 1
+            kinds[_name_joint(joint)] = kinds.get(_name_joint(joint), 0) + 1
         counts = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
-        say(f"{self.path}: {found.dialect}, {len(found.links)} links, {len(found.joints)} joints ({counts})")
+        print_text(f"{self.path}: {found.dialect}, {len(found.links)} links, {len(found.joints)} joints ({counts})")
         for note in found.notes:
-            say(f"  {note}")
+            print_text(f"  {note}")
 
     def _ask_closures(self, found: ImportChoices) -> None:
         """Request loop closures besides those of the file."""
-        from ..description.overrides import closures
+        from ..description.overrides import parse_closures
 
         closing, near = found.closing, found.candidates
-        say(f"\nLoops: {len(closing) or 'none'} closed by the file")
-        _list([f"{joint.name}: {joint.links[0]} to {joint.links[1]}, {_word(joint)}" for joint in closing], "-")
+        print_text(f"\nLoops: {len(closing) or 'none'} closed by the file")
+        _list([f"{joint.name}: {joint.links[0]} to {joint.links[1]}, {_name_joint(joint)}" for joint in closing], "-")
         if near:
-            say("Candidates for closures (frames near each other):")
+            print_text("Candidates for closures (frames near each other):")
             _list([str(each) for each in near])
         elif closing:
             return
 
         def chosen(text: str) -> list[str]:
             wishes = []
-            for word in _words(text) if "@" not in text else closures(text):
+            for word in _split_words(text) if "@" not in text else parse_closures(text):
                 number, _, kind = word.partition(":")
                 if number.isdecimal():
-                    wishes.append(near[_number(number, len(near)) - 1].wish + (f":{kind}" if kind else ""))
+                    wishes.append(near[_parse_number(number, len(near)) - 1].wish + (f":{kind}" if kind else ""))
                 else:
                     wishes.append(word)
             self.source["close"] = wishes
@@ -245,7 +245,7 @@ class _Dialog:
         )
 
     def _ask_base(self, found: ImportChoices) -> None:
-        say(
+        print_text(
             f"\nBase: {found.bases[0]}"
             + (f", one of {len(found.bases)} links without parent" if len(found.bases) > 1 else "")
         )
@@ -254,18 +254,18 @@ class _Dialog:
         name = _answer(
             "Use the whole robot, or only the links between another base and the platform? Name or number",
             "all",
-            lambda text: text if text == "all" else _one(text, found.bases, found.links),
+            lambda text: text if text == "all" else _choose_one(text, found.bases, found.links),
         )
         self.source["base"] = None if name == "all" else name
 
     def _ask_platform(self, found: ImportChoices) -> None:
         why = found.why or "named by the file"
-        say(f"\nPlatform: {found.platforms[0]}, {why}" if found.told else "\nPlatform: several candidates")
+        print_text(f"\nPlatform: {found.platforms[0]}, {why}" if found.told else "\nPlatform: several candidates")
         _list(found.platforms)
         name = _answer(
             "Which link is the platform? Number or name",
             found.platforms[0] if found.told else None,
-            lambda text: _one(text, found.platforms, found.links),
+            lambda text: _choose_one(text, found.platforms, found.links),
             self._view,
         )
         if found.why is not None or name != found.platforms[0]:
@@ -274,12 +274,17 @@ class _Dialog:
     def _ask_motors(self, found: ImportChoices) -> None:
         joints = found.moving
         driven = [joint.name for joint in joints if joint.motor is not None]
-        say(f"\nMotors: {', '.join(driven) or 'none named'}")
-        _list([f"{joint.name} ({_word(joint)}){', actuated' if joint.motor is not None else ''}" for joint in joints])
+        print_text(f"\nMotors: {', '.join(driven) or 'none named'}")
+        _list(
+            [
+                f"{joint.name} ({_name_joint(joint)}){', actuated' if joint.motor is not None else ''}"
+                for joint in joints
+            ]
+        )
 
         def chosen(text: str) -> str:
             named = [joint.name for joint in joints]
-            return ",".join(dict.fromkeys(_one(word, named, named) for word in _words(text)))
+            return ",".join(dict.fromkeys(_choose_one(word, named, named) for word in _split_words(text)))
 
         as_told = "as in the file" if driven else "none"
         answer = _answer(
@@ -293,12 +298,12 @@ class _Dialog:
     def _show_robot(self, mechanism: Mechanism) -> None:
         points = [joint.point for joint in mechanism.joints.values()]
         span = max((float(abs(one - other).max()) for one in points for other in points), default=0.0)
-        say(
+        print_text(
             f"\nRead: {mechanism.headline()}; base {mechanism.base}, platform {mechanism.platform}; joint span "
             f"{span:.4g} m"
         )
         for note in mechanism.notes:
-            say(f"  {note}")
+            print_text(f"  {note}")
 
     def _ask_unit(self, mechanism: Mechanism) -> Mechanism:
         from ..description.overrides import UNITS
@@ -308,14 +313,14 @@ class _Dialog:
                 raise ValueError(", ".join(UNITS))
             return text
 
-        say(f"\nLengths: characteristic length {mechanism.length:.3g} m if the file is in metres")
+        print_text(f"\nLengths: characteristic length {mechanism.length:.3g} m if the file is in metres")
         unit = _answer(f"Unit of the file? {', '.join(UNITS)}", "m", meant)
         self.source["unit"] = None if unit == "m" else unit
         return mechanism if unit == "m" else self._mechanism() or mechanism
 
     def _ask_segments(self, mechanism: Mechanism) -> str | None:
-        segments = _segments(mechanism)
-        say(
+        segments = _list_segments(mechanism)
+        print_text(
             "\nObserved: "
             + (
                 "; ".join(f"leg {leg} at {seen.link}" for leg, seen in segments.items())
@@ -329,7 +334,7 @@ class _Dialog:
         def chosen(text: str) -> str | None:
             if text == "these":
                 return None
-            named = [_one(word, (), mechanism.links) for word in _words(text)]
+            named = [_choose_one(word, (), mechanism.links) for word in _split_words(text)]
             observe_links(mechanism, named)
             return ",".join(named)
 
@@ -359,9 +364,9 @@ class _Dialog:
                 page = Path(tempfile.mkdtemp(prefix="hrsynth-"), "robot.html")
                 view(_read(self.source, self.observe, tell=False)).save(page)
         except HrsynthError as error:
-            say(f"No figure yet: {error.lines()[0]}")
+            print_text(f"No figure yet: {error.lines()[0]}")
             return
-        say(f"Robot drawn in {page}")
+        print_text(f"Robot drawn in {page}")
         webbrowser.open(page.as_uri())
 
 
@@ -381,42 +386,42 @@ def _answer(question: str, default: str | None, meant: Callable[[str], T], view:
         try:
             return meant(text or str(default))
         except HrsynthError as error:
-            say(f"  {error.lines()[0]}")
+            print_text(f"  {error.lines()[0]}")
         except ValueError as error:
-            say(f"  {text!r:.60}: not a valid answer: {error}")
+            print_text(f"  {text!r:.60}: not a valid answer: {error}")
 
 
-def _words(text: str) -> list[str]:
+def _split_words(text: str) -> list[str]:
     words = [word.strip() for word in text.split(",") if word.strip()]
     if not words:
         raise ValueError("no name")
     return words
 
 
-def _number(text: str, most: int) -> int:
+def _parse_number(text: str, most: int) -> int:
     number = int(text) if len(text) < 6 else 0
     if not 1 <= number <= most:
         raise ValueError(f"numbers go from 1 to {most}" if most else "no numbers to choose from")
     return number
 
 
-def _one(text: str, listed: Sequence[str], named: Iterable[str]) -> str:
+def _choose_one(text: str, listed: Sequence[str], named: Iterable[str]) -> str:
     """Return the choice of a name or number."""
     if text in named or text in listed:
         return text
     if text.isdecimal():
-        return listed[_number(text, len(listed)) - 1]
+        return listed[_parse_number(text, len(listed)) - 1]
     raise ValueError("unknown name")
 
 
 def _list(lines: Sequence[str], mark: str | None = None) -> None:
-    for number, line in enumerate(lines[:SHOWN], 1):
-        say(f"  {mark or number:>2}  {line}")
-    if len(lines) > SHOWN:
-        say(f"      and {len(lines) - SHOWN} more, by name")
+    for number, line in enumerate(lines[:IMPORT_CHOICES_PRINTED_MAX], 1):
+        print_text(f"  {mark or number:>2}  {line}")
+    if len(lines) > IMPORT_CHOICES_PRINTED_MAX:
+        print_text(f"      and {len(lines) - IMPORT_CHOICES_PRINTED_MAX} more, by name")
 
 
-def _word(joint: Any) -> str:
+def _name_joint(joint: Any) -> str:
     return str(joint.kind.name).lower()
 
 
@@ -443,7 +448,7 @@ def add(app: Group) -> None:
             ),
             JSON,
         ),
-        importing,
+        run_import,
         ("leg.xml -o leg.urdf", "leg.urdf --close heel:toe:revolute --platform sole --yes -o own.urdf"),
         Import,
     )

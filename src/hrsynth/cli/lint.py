@@ -6,23 +6,23 @@ from collections.abc import Iterable
 from typing import Any
 
 from ..options import NEEDED, OUTPUT, Option, flag, output
-from .colour import paint, say
+from .colour import paint, print_text
 from .commands import Group, add_command
-from .options import JSON, SOURCE, shipped_names
+from .options import JSON, SOURCE, list_shipped_names
 from .progress import Progress
 
 FORMATS = ("text", "github", "sarif", "json")
 FAILING = ("error", "warning", "note", "nothing")
 
 
-def rules() -> Iterable[str]:
+def list_rule_names() -> Iterable[str]:
     """Return the names of the rules."""
     from ..linting.rules import lint_rules
 
     return lint_rules()
 
 
-def programs() -> Iterable[str]:
+def list_program_names() -> Iterable[str]:
     """Return the names of the programs whose readers are known."""
     from ..linting.rules.readers import PROGRAMS
 
@@ -42,7 +42,7 @@ def lint(
     import hrsynth
 
     from ..errors import BadRequest, BadRobotFile
-    from ..present.show import record
+    from ..present.show import format_record
     from ..present.text import lint as shown
 
     for name, value, known in (("--format", format, FORMATS), ("--fail-on", fail_on, FAILING)):
@@ -54,16 +54,16 @@ def lint(
         given["close"] = given["close"] or ()
         found = hrsynth.lint(files, program=program or (), ignore=ignore or (), **given)
     if json or format == "json":
-        say(record("lint", None, found.to_dict()))
+        print_text(format_record("lint", None, found.to_dict()))
     elif format == "text":
-        say(hrsynth.text(found), paint=paint)
+        print_text(hrsynth.text(found), paint=paint)
     else:
-        say(shown.github(found) if format == "github" else shown.sarif(found))
+        print_text(shown.format_github(found) if format == "github" else shown.format_sarif(found))
     if found.unread:
         for defect in found.unread:
-            say(f"hrsynth: {defect}", err=True)
+            print_text(f"hrsynth: {defect}", err=True)
         raise SystemExit(BadRobotFile.exit_status)
-    if fail_on != "nothing" and found.reaches(fail_on):
+    if fail_on != "nothing" and found.has_severity(fail_on):
         raise SystemExit(1)
 
 
@@ -81,7 +81,7 @@ def add(app: Group) -> None:
                 list[str],
                 NEEDED,
                 argument=True,
-                words=shipped_names,
+                words=list_shipped_names,
             ),
             flag("fix", "Apply fixes that leave no choice; overwrite the file or write to --output."),
             Option("compare", "Another file of the same robot: list the differences.", "OTHER"),
@@ -91,9 +91,9 @@ def add(app: Group) -> None:
                 "an error; repeat for more.",
                 "NAME",
                 list[str],
-                words=programs,
+                words=list_program_names,
             ),
-            Option("ignore", "A rule to leave out; repeat for more.", "RULE", list[str], words=rules),
+            Option("ignore", "A rule to leave out; repeat for more.", "RULE", list[str], words=list_rule_names),
             Option(
                 "fail_on",
                 "The mildest severity that makes the exit status 1: error, warning, note, nothing.",

@@ -8,13 +8,13 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from ..options import NEEDED, OUTPUT, OVERRIDES, Option, flag
-from .colour import say
+from .colour import print_text
 
 if TYPE_CHECKING:
     from ..mechanism import Mechanism
 
 
-def shipped_names() -> Iterable[str]:
+def list_shipped_names() -> Iterable[str]:
     """Return the names of the shipped robots."""
     from ..description import list_robots
 
@@ -29,7 +29,7 @@ SOURCE = (
         "ROBOT",
         default=NEEDED,
         argument=True,
-        words=shipped_names,
+        words=list_shipped_names,
     ),
     Option("base", "The base: consider only the links between it and the platform.", "LINK", group=OVERRIDES),
     Option("platform", "The platform, if the file names none.", "LINK", group=OVERRIDES),
@@ -73,15 +73,15 @@ SOURCE = (
 """Robot file and its overrides."""
 
 
-def robot_of(values: dict[str, Any]) -> Mechanism:
+def load_robot(values: dict[str, Any]) -> Mechanism:
     """Load the mechanism of the options of ``SOURCE``, removed from ``values``; print assumptions to standard error."""
-    mechanism = quiet_robot_of(values)
+    mechanism = load_robot_silently(values)
     for note in mechanism.notes:
         warn(str(note))
     return mechanism
 
 
-def quiet_robot_of(values: dict[str, Any]) -> Mechanism:
+def load_robot_silently(values: dict[str, Any]) -> Mechanism:
     """Load the mechanism without printing assumptions."""
     from ..description import load
 
@@ -93,10 +93,10 @@ def quiet_robot_of(values: dict[str, Any]) -> Mechanism:
 
 def warn(text: str) -> None:
     """Print a note to standard error."""
-    say(f"hrsynth: {text}", err=True)
+    print_text(f"hrsynth: {text}", err=True)
 
 
-def told_radians(option: str, text: str | None) -> None:
+def warn_radians(option: str, text: str | None) -> None:
     """Print in degrees an angle that was given without a unit."""
     for field in (text or "").split(","):
         try:
@@ -111,14 +111,14 @@ def told_radians(option: str, text: str | None) -> None:
         )
 
 
-def told_turns(option: str, text: object) -> None:
+def warn_turns(option: str, text: object) -> None:
     """Print in degrees a rotation above 180 degrees that was given without a unit."""
     for pose in text if isinstance(text, list) else [text]:
         for field in pose.split(",") if isinstance(pose, str) else ():
             name, _, value = field.partition("=")
             with contextlib.suppress(ValueError):
                 if name.strip() == "phi" and math.pi < abs(float(value)) < math.inf:
-                    told_radians(option, field)
+                    warn_radians(option, field)
 
 
 def split_names(text: str) -> list[str]:

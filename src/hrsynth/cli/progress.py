@@ -12,15 +12,15 @@ from collections import deque
 from datetime import timedelta
 from typing import Self
 
-from .colour import overwrite, say
+from .colour import print_text, replace_line
 
-SPEED_OVER = 600.0
+BUILD_SPEED_WINDOW_S = 600.0
 """Seconds over which the speed of a build is averaged."""
-SILENT = 30.0
+PROGRESS_LINE_INTERVAL_S = 30.0
 """Seconds before the first line without a terminal; later lines at doubled times."""
 OFTEN, AGAIN = 0.1, 1.0
 """Shortest and longest time between two updates on a terminal (s)."""
-BAR = 40
+PROGRESS_BAR_COLUMNS_COUNT = 40
 """Width of a bar (columns)."""
 
 
@@ -39,7 +39,7 @@ class Progress:
         self._parts: dict[str, tuple[int, int]] = {}
         self._known = deque[tuple[float, int]]()
         self._written: float | None = None
-        self._arm(max(0.0, wait) if self._terminal else SILENT)
+        self._arm(max(0.0, wait) if self._terminal else PROGRESS_LINE_INTERVAL_S)
 
     def __enter__(self) -> Self:
         if self._terminal or not self._counted:
@@ -51,7 +51,7 @@ class Progress:
             self._start = float("inf")
             if self._written is not None:
                 self._write()
-                overwrite("")
+                replace_line("")
         self._timer.cancel()
 
     def tell(self, what: str) -> None:
@@ -63,7 +63,7 @@ class Progress:
         self._parts[part] = done, total
         there, self._total = map(sum, zip(*self._parts.values(), strict=True))
         self._known.append((time.monotonic(), there))
-        while self._known[-1][0] - self._known[0][0] > SPEED_OVER:
+        while self._known[-1][0] - self._known[0][0] > BUILD_SPEED_WINDOW_S:
             self._known.popleft()
         self._show(part, there)
 
@@ -87,24 +87,24 @@ class Progress:
             if self._terminal:
                 self._write()
             else:
-                say(f"hrsynth: {self._what}, step {self._done}, {passed:.0f} s", err=True)
+                print_text(f"hrsynth: {self._what}, step {self._done}, {passed:.0f} s", err=True)
             self._arm(AGAIN if self._terminal else passed)
             self._timer.start()
 
     def _write(self) -> None:
         self._written = time.monotonic()
-        overwrite(self._line(self._written)[: shutil.get_terminal_size().columns - 1])
+        replace_line(self._line(self._written)[: shutil.get_terminal_size().columns - 1])
 
     def _line(self, now: float) -> str:
         if not self._total:
-            return f"{self._what} step {self._done} {_clock(now - self._began)}"
+            return f"{self._what} step {self._done} {_format_clock(now - self._began)}"
         began, before = self._known[0]
         left = "-:--:--"
         if self._done > before:
-            left = _clock((now - began) * (self._total - self._done) / (self._done - before))
-        full = BAR * self._done // self._total
-        return f"{self._what} {'━' * full}{'─' * (BAR - full)} {self._done}/{self._total} {left} left"
+            left = _format_clock((now - began) * (self._total - self._done) / (self._done - before))
+        full = PROGRESS_BAR_COLUMNS_COUNT * self._done // self._total
+        return f"{self._what} {'━' * full}{'─' * (PROGRESS_BAR_COLUMNS_COUNT - full)} {self._done}/{self._total} {left} left"
 
 
-def _clock(seconds: float) -> str:
+def _format_clock(seconds: float) -> str:
     return str(timedelta(seconds=round(seconds)))

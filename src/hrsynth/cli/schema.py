@@ -10,10 +10,10 @@ import hrsynth
 
 from .. import records
 from ..options import NEEDED, Option
-from ..present.outputs import File, function, outputs_of
-from ..records import Head, OfRobot, answer_type, object_schema, summary
+from ..present.outputs import File, get_outputs, load_function
+from ..records import Head, OfRobot, answer_type, build_object_schema, read_summary
 from .app import app
-from .colour import say
+from .colour import print_text
 from .commands import DeclaredCommand, Group, add_command
 
 INTRODUCTION = """What every command prints with `--json`: one object. `hrsynth schema COMMAND` prints its JSON
@@ -25,40 +25,42 @@ decided. Arrays over a grid are nested in the order of its `axes`.
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
-def schema(command: str) -> dict[str, Any]:
+def build_schema(command: str) -> dict[str, Any]:
     """Return the schema of a command; raises ``KeyError`` for a command without JSON."""
     parts: dict[str, Any] = {}
-    kind = commands()[command].record
+    kind = list_json_commands()[command].record
     files: tuple[File, ...] = ()
     if kind is not None:
-        heads = [object_schema([kind], parts)]
+        heads = [build_object_schema([kind], parts)]
     else:
-        kind, files = answer_type(getattr(hrsynth, command)), outputs_of(command).files
+        kind, files = answer_type(getattr(hrsynth, command)), get_outputs(command).files
         of_robot = "robot" in signature(getattr(hrsynth, command)).parameters
-        heads = [object_schema([OfRobot if of_robot else Head, each], parts) for each in get_args(kind) or (kind,)]
+        heads = [
+            build_object_schema([OfRobot if of_robot else Head, each], parts) for each in get_args(kind) or (kind,)
+        ]
     fields = {file.field: str | None for file in files if file.option is not None and file.field is not None}
     fields |= {
-        file.record: answer_type(function(file.computed)) | None for file in files if file.record and file.computed
+        file.record: answer_type(load_function(file.computed)) | None for file in files if file.record and file.computed
     }
     for each in heads:
-        each["properties"] |= {name: records.schema(kind, parts) for name, kind in fields.items()}
+        each["properties"] |= {name: records.build_type_schema(kind, parts) for name, kind in fields.items()}
         each["required"] = sorted([*each["required"], *fields])
-    told = {"title": f"hrsynth {command} --json", "description": summary((get_args(kind) or (kind,))[0])}
+    told = {"title": f"hrsynth {command} --json", "description": read_summary((get_args(kind) or (kind,))[0])}
     return {"$schema": DIALECT, **told, **(heads[0] if len(heads) == 1 else {"anyOf": heads}), "$defs": parts}
 
 
-def commands() -> dict[str, DeclaredCommand]:
+def list_json_commands() -> dict[str, DeclaredCommand]:
     """Return the commands that print JSON, by name."""
     every: list[Any] = [*app.commands.values()]
     leaves = [each for group in every for each in getattr(group, "commands", {"": group}).values()]
     return {each.name: each for each in leaves if any(option.name == "json" for option in each.options)}
 
 
-def page() -> str:
+def format_schema_page() -> str:
     """Return the page of all schemas, in Markdown."""
     blocks = ["# The JSON of every command", INTRODUCTION]
-    for command in commands():
-        lines = javascript.dumps(schema(command), ensure_ascii=False, indent=1).splitlines()
+    for command in list_json_commands():
+        lines = javascript.dumps(build_schema(command), ensure_ascii=False, indent=1).splitlines()
         inside = "\n".join(f"    {line}" for line in ("```json", *lines, "```"))
         blocks.append(f'??? abstract "{command}"\n\n{inside}')
     return "\n\n".join(blocks) + "\n"
@@ -72,14 +74,14 @@ def add(app: Group) -> None:
         from ..errors import BadRequest
 
         name = " ".join(command)
-        if name not in commands():
+        if name not in list_json_commands():
             what = (
                 "command without JSON"
                 if name in app.commands and not isinstance(app.commands[name], Group)
                 else "unknown command"
             )
-            raise BadRequest(what, name, tuple(commands()))
-        say(javascript.dumps(schema(name), ensure_ascii=False, indent=2))
+            raise BadRequest(what, name, tuple(list_json_commands()))
+        print_text(javascript.dumps(build_schema(name), ensure_ascii=False, indent=2))
 
     add_command(
         app,
@@ -93,7 +95,7 @@ def add(app: Group) -> None:
                 list[str],
                 NEEDED,
                 argument=True,
-                words=lambda: [each for each in commands() if " " not in each],
+                words=lambda: [each for each in list_json_commands() if " " not in each],
             ),
         ),
         told,

@@ -7,9 +7,9 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 from ..options import OBSERVATION, Option
-from .colour import say
+from .colour import print_text
 from .commands import Group, add_command
-from .options import shipped_names, split_names
+from .options import list_shipped_names, split_names
 
 if TYPE_CHECKING:
     from ..present.studio.server import StudioServer
@@ -36,7 +36,7 @@ def serve(server: StudioServer, what: str) -> None:
             if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup leaves it
                 signal.signal(number, end)
     try:
-        say(f"{what} is served at {server.address} (Ctrl-C ends it).")
+        print_text(f"{what} is served at {server.address} (Ctrl-C ends it).")
         server.wait()
     except KeyboardInterrupt:
         pass
@@ -57,7 +57,7 @@ def add(app: Group) -> None:
                 "A robot file in any format, a shipped robot's name, example:NAME, or a folder.",
                 "[ROBOT|FOLDER]",
                 argument=True,
-                words=shipped_names,
+                words=list_shipped_names,
             ),
             Option("observe", "Legs to observe (1,4), links, or all (default: all).", "LEGS", group=OBSERVATION),
             Option("camera", "The link that carries the camera.", "LINK", group=OBSERVATION),

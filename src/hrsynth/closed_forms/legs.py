@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ..geometry.balls import Field, widen
 from ..geometry.components import Components, cross, dot, minus, plus, scale, sqrt
 from ..geometry.vectors import Array
-from ..tolerances import FOLLOWED
+from ..tolerances import HIDDEN_ROBOT_RESIDUAL_TOL
 from .platform_points import ORIGIN, PlatformPoint
 
 Number = Callable[[Any], Any]
@@ -126,7 +126,7 @@ def _as_number(value: Any, like: Field) -> Any:
     """A number or vector of the geometry, for numbers; among balls, one that holds what it was rounded from."""
     if like.dtype != object:
         return value
-    found = widen(np.asarray(value, dtype=object), FOLLOWED)
+    found = widen(np.asarray(value, dtype=object), HIDDEN_ROBOT_RESIDUAL_TOL)
     return found[()] if found.ndim == 0 else found
 
 
@@ -214,7 +214,7 @@ class PlatformDirection(ClosedFormLeg):
 
 
 @dataclass(frozen=True, eq=False)
-class Pinned(ClosedFormLeg):
+class PinnedRod(ClosedFormLeg):
     """B is the tip itself: the link that carries it is jointed to the platform, whose direction ``axis`` is the rod."""
 
     axis: Array = field(kw_only=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..geometry.balls import Field, widen
 from ..geometry.vectors import Array
-from ..tolerances import FOLLOWED, RANK_CUTOFF
+from ..tolerances import HIDDEN_ROBOT_RESIDUAL_TOL, RANK_CUTOFF_FRACTION
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +24,7 @@ class PlatformPoint:
     def value(self, p: Field, R: Field) -> Field:
         """The vectors (n, 3) at poses (n, 3), (n, 3, 3); of balls, with all that the rounded numbers stand for."""
         found = (p if self.follows else 0 * p) + self.constant
-        return widen(np.asarray(found + R @ self.turned if np.any(self.turned) else found), FOLLOWED)
+        return widen(np.asarray(found + R @ self.turned if np.any(self.turned) else found), HIDDEN_ROBOT_RESIDUAL_TOL)
 
 
 ORIGIN = PlatformPoint(True, np.zeros(3), np.zeros(3))
@@ -33,13 +33,13 @@ ORIGIN = PlatformPoint(True, np.zeros(3), np.zeros(3))
 
 def platform_point(values: Array, p: Array, R: Array) -> PlatformPoint | None:
     """The rule that vectors (n, 3) follow at poses (n, 3), (n, 3, 3), by least squares; None where there is none."""
-    if np.max(np.abs(values - values[0])) < FOLLOWED:
+    if np.max(np.abs(values - values[0])) < HIDDEN_ROBOT_RESIDUAL_TOL:
         return PlatformPoint(False, np.zeros(3), values[0], True)
     rows = np.concatenate([R, np.broadcast_to(np.eye(3), R.shape)], axis=2).reshape(-1, 6)
     for follows in (False, True):
         wanted = (values - p if follows else values).reshape(-1)
-        found = np.linalg.lstsq(rows, wanted, rcond=RANK_CUTOFF)[0]
-        if np.max(np.abs(rows @ found - wanted)) < FOLLOWED:
-            turned, constant = np.where(np.abs(found) < FOLLOWED, 0.0, found).reshape(2, 3)
+        found = np.linalg.lstsq(rows, wanted, rcond=RANK_CUTOFF_FRACTION)[0]
+        if np.max(np.abs(rows @ found - wanted)) < HIDDEN_ROBOT_RESIDUAL_TOL:
+            turned, constant = np.where(np.abs(found) < HIDDEN_ROBOT_RESIDUAL_TOL, 0.0, found).reshape(2, 3)
             return PlatformPoint(follows, turned, constant, True)
     return None

@@ -10,13 +10,13 @@ from types import MappingProxyType
 import numpy as np
 
 from ..analysis.branch.answer import BranchPart, BranchProof
-from ..analysis.branch.loop_parts import DISTANCE, LoopPart, parts_of, whole
+from ..analysis.branch.loop_parts import DISTANCE, LoopPart, evaluate_all_equations, split_loop_system
 from ..analysis.branch.loops import LoopSystem
-from ..budgets import FARTHEST_MOTOR
-from ..errors import NothingProved
+from ..budgets import FREE_MOTOR_VALUE_MAX
+from ..errors import NoProvedCell
 from ..geometry.vectors import Array
 from ..results import Value
-from ..tolerances import GENERATED_CLOSED
+from ..tolerances import GENERATED_CLOSURE_TOL
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -47,7 +47,7 @@ class TubePart(Value):
     solved: tuple[int, ...]
 
     @property
-    def exact(self) -> bool:
+    def is_square(self) -> bool:
         """Return True if these are as many as the unknowns: the closure is their zero."""
         return len(self.solved) == len(self.unknowns)
 
@@ -81,15 +81,17 @@ class TubedBranch(Value):
     @classmethod
     def of(cls, proof: BranchProof, asked: Mapping[str, tuple[float, float]] = MappingProxyType({})) -> TubedBranch:
         """The parts of a proof that have cells; a motor that is in none keeps to its limits and to the interval that is
-        ``asked`` for. Raises ``NothingProved`` where a part has no cells."""
+        ``asked`` for. Raises ``NoProvedCell`` where a part has no cells."""
         system, table = proof.system, {name: i for i, name in enumerate(proof.system.names)}
         motors = tuple(table[name] for name in proof.motors)
         lower, upper = np.full(len(motors), -np.inf), np.full(len(motors), np.inf)
         parts = []
-        solved = {tuple(own.unknowns): _solved_places(proof.system, own) for own in parts_of(proof.system)[0]}
+        solved = {
+            tuple(own.unknowns): _list_solved_rows(proof.system, own) for own in split_loop_system(proof.system)[0]
+        }
         for part in proof.parts:
             if not part.cells:
-                raise NothingProved(proof.robot.name, part.motors, _reasons(part))
+                raise NoProvedCell(proof.robot.name, part.motors, _explain_unproved(part))
             driven = tuple(table[name] for name in part.motors)
             cells = tuple(TubeCell(each.low, each.high, each.centre, each.slopes, each.radius) for each in part.cells)
             places = [motors.index(i) for i in driven]
@@ -100,7 +102,7 @@ class TubedBranch(Value):
         for place, i in enumerate(motors):
             low, high = proof.robot.filed.get(system.coordinates[i].joint, (-np.inf, np.inf))
             if not np.isfinite(lower[place]):  # in no loop
-                ends = asked.get(system.coordinates[i].name, (-FARTHEST_MOTOR, FARTHEST_MOTOR))
+                ends = asked.get(system.coordinates[i].name, (-FREE_MOTOR_VALUE_MAX, FREE_MOTOR_VALUE_MAX))
                 lower[place], upper[place] = max(low, ends[0]), min(high, ends[1])
         return cls(system.metric, motors, lower, upper, tuple(parts), proof.injective_box)
 
@@ -132,16 +134,16 @@ class TubedBranch(Value):
         """Return the residuals of equations, by their indices among all, below which their loops count as closed."""
         units = [self.far if row.kind == "point" else 1.0 for loop in self.system.loops for row in loop.rows]
         units += [self.far if self.system.coordinates[gear.second].slides else 1.0 for gear in self.system.gears]
-        return np.asarray(GENERATED_CLOSED * np.array(units)[list(rows)])
+        return np.asarray(GENERATED_CLOSURE_TOL * np.array(units)[list(rows)])
 
     def evaluate(self, q: Array, x: Array) -> tuple[Array, Array]:
         """All equations (e,) and their derivatives (e, N) at q and x, in the order of ``motors`` and ``passive``."""
         values = self.system.zero
         values[list(self.motors)], values[list(self.passive)] = q, x
-        return whole(self.system, self.system.loops, self.system.gears, values)
+        return evaluate_all_equations(self.system, self.system.loops, self.system.gears, values)
 
 
-def _reasons(part: BranchPart) -> str:
+def _explain_unproved(part: BranchPart) -> str:
     """Return the reasons for which nothing of a part is proved: each once, with the place nearest to zero."""
     nearest: dict[str, Array] = {}
     for each in sorted(part.toggles, key=lambda each: float(np.linalg.norm(each.q))):
@@ -149,7 +151,7 @@ def _reasons(part: BranchPart) -> str:
     return "; ".join(f"{reason} (at {part.place(q)})" for reason, q in nearest.items())
 
 
-def _solved_places(system: LoopSystem, part: LoopPart) -> tuple[int, ...]:
+def _list_solved_rows(system: LoopSystem, part: LoopPart) -> tuple[int, ...]:
     """The places among all equations of those that hold where a part is solved: of a loop that is closed by turning a
     rod all of them, if its length is among what was solved."""
     left = {(each.of.name, id(each.row)) for each in part.left_out}

@@ -15,7 +15,7 @@ Node = tuple[int, float, int, int]
 """Axis, value, and where to go on below it and from it on: a node, or ~cell, or ``OUTSIDE``."""
 
 
-def cell_tree(lower: Array, upper: Array, cells: Sequence[tuple[Array, Array]]) -> tuple[int, list[Node]]:
+def build_cell_tree(lower: Array, upper: Array, cells: Sequence[tuple[Array, Array]]) -> tuple[int, list[Node]]:
     """Root and nodes for cells (lower, upper), (m,) each, within a box from ``lower`` to ``upper``; what no cell fills
     is outside. Cells may touch, and lie as halving leaves them. What lies on a plane may be on either side of it."""
     nodes: list[Node] = []
@@ -42,7 +42,7 @@ def cell_tree(lower: Array, upper: Array, cells: Sequence[tuple[Array, Array]]) 
             found = of(low, high, inside)
             nodes[place] = (axis, value, *((found, OUTSIDE) if side else (OUTSIDE, found)))
             return place
-        axis, value = _plane([cells[i] for i in inside])
+        axis, value = _choose_cut([cells[i] for i in inside])
         place = len(nodes)
         nodes.append((axis, value, 0, 0))
         below = [i for i in inside if cells[i][1][axis] <= value]
@@ -56,7 +56,7 @@ def cell_tree(lower: Array, upper: Array, cells: Sequence[tuple[Array, Array]]) 
     return root, nodes
 
 
-def tree_depth(root: int, nodes: Sequence[Node]) -> int:
+def compute_tree_depth(root: int, nodes: Sequence[Node]) -> int:
     """Return the number of nodes on the longest path from the root."""
     depth, level = 0, [root] if root >= 0 else []
     while level:
@@ -64,7 +64,7 @@ def tree_depth(root: int, nodes: Sequence[Node]) -> int:
     return depth
 
 
-def _plane(cells: Sequence[tuple[Array, Array]]) -> tuple[int, float]:
+def _choose_cut(cells: Sequence[tuple[Array, Array]]) -> tuple[int, float]:
     """The plane that cuts no cell and parts them most evenly."""
     low, high = (np.array([cell[side] for cell in cells]) for side in (0, 1))
     best: tuple[int, int, float] | None = None

@@ -26,31 +26,38 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.branch.carried_vectors import SweptChains, Total, add_bend, row_product
-from ..analysis.branch.cells import TubeTrial, derivatives, drift, inverses, middles, residual
+from ..analysis.branch.carried_vectors import SweptChains, Total, add_bend, build_row_product
+from ..analysis.branch.cells import (
+    TubeTrial,
+    bound_drift,
+    evaluate_derivatives,
+    evaluate_residual,
+    invert_matrices,
+    split_cells,
+)
 from ..analysis.branch.loop_parts import LoopBlock, LoopEquation, LoopPart
 from ..analysis.branch.loops import JointLoop
 from ..budgets import (
-    BOUND_HALVINGS,
-    CELLS_TOGETHER,
-    MOST_BOUNDED,
-    MOST_BOUNDED_NUMBERS,
-    MOST_PARTS,
-    NEWTON_STEPS_AT_RUN,
+    BOUND_CELL_PARTS_MAX,
+    BOUND_SIDE_HALVINGS_MAX,
+    BOUNDED_CELLS_BATCH_COUNT,
+    BOUNDED_PARTS_COUNT,
+    BOUNDED_SLOPES_COUNT,
+    GENERATED_NEWTON_STEPS_MAX,
 )
 from ..geometry.affine import AffineForms, combine, stack
 from ..geometry.vectors import Array
 from ..results import Value
 from ..tolerances import (
     AFFINE_ROUNDING,
+    BOUND_RADIUS_FRACTION,
     BOUND_ROUNDING,
-    BOUND_WIDER,
     FREE_WIDER,
     FREEST_WIDER,
-    GENERATED_ERROR,
-    GENERATED_LAST_STEP,
-    GENERATED_NEAR,
-    PART_TUBE,
+    GENERATED_LAST_STEP_MAX,
+    GENERATED_NEWTON_STEP_TOL,
+    GENERATED_RESULT_ERROR_MAX,
+    PART_TUBE_RADIUS_FRACTION,
     UNIT_ROUNDOFF,
 )
 from .branch_cells import TubeCell, TubedBranch, TubePart
@@ -70,9 +77,9 @@ class BoundedCell(Value):
     inner: Array
     alone: bool
 
-    def good(self, units: Array) -> bool:
+    def is_convergence_proved(self, units: Array) -> bool:
         """Return True if everything required is proved."""
-        return bool(self.steps and np.all(self.error <= GENERATED_ERROR * units))
+        return bool(self.steps and np.all(self.error <= GENERATED_RESULT_ERROR_MAX * units))
 
     def is_of(self, parent: BoundedCell) -> bool:
         """Return True if it is proved that there is a closure in its tube, that of the cell of which this is a part."""
@@ -87,13 +94,13 @@ class BoundedCell(Value):
 
     def trial_cell(self, units: Array) -> TubeCell:
         """The cell as a program has it: where its steps are bounded, an answer in its tube counts though it is off."""
-        widened = np.maximum(self.cell.radius, self.inner) + GENERATED_NEAR * units
+        widened = np.maximum(self.cell.radius, self.inner) + GENERATED_NEWTON_STEP_TOL * units
         return replace(self.cell, radius=widened) if self.steps else self.cell
 
     @property
-    def divisible(self) -> bool:
+    def can_halve_all_sides(self) -> bool:
         """Return True if it has few enough sides to halve them all."""
-        return bool(2 ** len(self.cell.lower) <= MOST_PARTS)
+        return bool(2 ** len(self.cell.lower) <= BOUND_CELL_PARTS_MAX)
 
     def split(self, loops: LoopPart, known: bool) -> _Parts:
         """Its parts when all its sides are halved: with its own tube, which is ``known`` to hold a closure, or with
@@ -107,7 +114,11 @@ class BoundedCell(Value):
         if not known:
             x = loops.close(centres, x)[0]
             slopes = loops.slopes(centres, x)
-        radius = (cell.radius + AFFINE_ROUNDING * np.abs(x).max(axis=0)) if known else PART_TUBE * cell.radius
+        radius = (
+            (cell.radius + AFFINE_ROUNDING * np.abs(x).max(axis=0))
+            if known
+            else PART_TUBE_RADIUS_FRACTION * cell.radius
+        )
         return _Parts(
             self,
             [
@@ -127,7 +138,7 @@ class _Parts:
     known: bool
 
 
-def bounded_cells(
+def bound_cells(
     branch: TubedBranch,
     part: TubePart,
     solved: Sequence[int],
@@ -144,10 +155,10 @@ def bounded_cells(
     loops = LoopPart(system, part.driven, part.unknowns, (block,), system.loops, system.gears)
     code = _Code(branch, part, loops, equations, closure, list(rows), branch.closing_tolerance(solved))
     found: list[BoundedCell] = []
-    most = min(MOST_BOUNDED, MOST_BOUNDED_NUMBERS // (len(part.driven) * len(part.unknowns)))
+    most = min(BOUNDED_PARTS_COUNT, BOUNDED_SLOPES_COUNT // (len(part.driven) * len(part.unknowns)))
     nothing = np.full(len(rows), np.inf)
     left = [_Parts(BoundedCell(cell, 0, nothing, cell.radius, False), [cell], True) for cell in part.cells]
-    for depth in range(BOUND_HALVINGS + 1):
+    for depth in range(BOUND_SIDE_HALVINGS_MAX + 1):
         again: list[_Parts] = []
         smaller: list[_Parts] = []
         for some in (left, again):
@@ -157,9 +168,9 @@ def bounded_cells(
                     continue
                 for each in made:
                     if (
-                        each.good(code.units)
-                        or depth == BOUND_HALVINGS
-                        or not each.divisible
+                        each.is_convergence_proved(code.units)
+                        or depth == BOUND_SIDE_HALVINGS_MAX
+                        or not each.can_halve_all_sides
                         or len(smaller) * 2 ** len(part.driven) >= most
                     ):
                         found.append(each)
@@ -198,8 +209,8 @@ class _Code:
         made = iter(
             [
                 each
-                for k in range(0, len(pairs), CELLS_TOGETHER)
-                for each in self._together(*map(list, zip(*pairs[k : k + CELLS_TOGETHER], strict=True)))
+                for k in range(0, len(pairs), BOUNDED_CELLS_BATCH_COUNT)
+                for each in self._together(*map(list, zip(*pairs[k : k + BOUNDED_CELLS_BATCH_COUNT], strict=True)))
             ]
         )
         return (list(islice(made, len(each.cells))) for each in every)
@@ -207,10 +218,12 @@ class _Code:
     def _together(self, cells: list[TubeCell], known: list[bool]) -> list[BoundedCell]:
         """Some cells with their bounds, by the first width of the tubes that gives one."""
         found: list[BoundedCell] = []
-        for wider in (BOUND_WIDER, *(() if self.part.exact else (FREE_WIDER, FREEST_WIDER))):
-            now = _bounds(self, cells, known, wider)
+        for wider in (BOUND_RADIUS_FRACTION, *(() if self.part.is_square else (FREE_WIDER, FREEST_WIDER))):
+            now = _bound_steps(self, cells, known, wider)
             found = [
-                old if old.good(self.units) or (old.alone and not new.good(self.units)) else new
+                old
+                if old.is_convergence_proved(self.units) or (old.alone and not new.is_convergence_proved(self.units))
+                else new
                 for old, new in zip(found or now, now, strict=True)
             ]
         return found
@@ -264,72 +277,74 @@ class _Code:
         return solved, self.growth * sums.max(axis=1) + doubt, np.abs(trial.x) + reach
 
 
-def _trial(loops: LoopPart, cells: Sequence[TubeCell]) -> TubeTrial:
+def _stack_cells(loops: LoopPart, cells: Sequence[TubeCell]) -> TubeTrial:
     """Cells as the enclosures take them."""
     lower, upper, x, slopes, radius = (
         np.array([getattr(cell, name) for cell in cells]) for name in ("lower", "upper", "middle", "slopes", "radius")
     )
-    return TubeTrial(loops, *middles(lower, upper), x, slopes, radius, np.zeros(len(x)), np.ones(len(x), dtype=bool))
+    return TubeTrial(
+        loops, *split_cells(lower, upper), x, slopes, radius, np.zeros(len(x)), np.ones(len(x), dtype=bool)
+    )
 
 
-def _bounds(code: _Code, cells: Sequence[TubeCell], known: Sequence[bool], wider: float) -> list[BoundedCell]:
+def _bound_steps(code: _Code, cells: Sequence[TubeCell], known: Sequence[bool], wider: float) -> list[BoundedCell]:
     """Steps 1 to 4 of the head of this file; ``known``: which tubes hold a closure,
     ``wider`` the radius R, as part of the tube's."""
-    trial, solved = _trial(code.loops, cells), code.solved
+    trial, solved = _stack_cells(code.loops, cells), code.solved
     (c, p), units = trial.x.shape, code.units
-    own, one, near, last = list(range(p)), np.eye(p), GENERATED_NEAR * units, GENERATED_LAST_STEP * units
+    own, one, near, last = list(range(p)), np.eye(p), GENERATED_NEWTON_STEP_TOL * units, GENERATED_LAST_STEP_MAX * units
     with np.errstate(all="ignore"):
         # 1. where the closure is
         largest = (trial.radius / units).max(axis=-1)[:, None] * units
         wide = wider * (largest if wider == FREEST_WIDER else trial.radius) + 4 * near
-        J = derivatives(trial, solved, own, wide).by_own
-        Y = inverses(J.v[0])
-        P, M = _level(combine(Y, J), trial.symbols[0])
-        size, Q = P @ np.abs(Y), _curvature_bounds(solved, trial, wide, Y, P)
-        inside = derivatives(trial, solved, own, 0.0 * trial.radius)
-        g = combine(Y, residual(trial, solved)).size + drift(combine(Y, inside.along))
-        back = _inverse_bound(M)
-        a = _times(back @ P, np.fmin(g, combine(Y, inside.values).size))
-        if code.part.exact:
+        J = evaluate_derivatives(trial, solved, own, wide).by_own
+        Y = invert_matrices(J.v[0])
+        P, M = _bound_matrices(combine(Y, J), trial.symbols[0])
+        size, Q = P @ np.abs(Y), _bound_curvature(solved, trial, wide, Y, P)
+        inside = evaluate_derivatives(trial, solved, own, 0.0 * trial.radius)
+        g = combine(Y, evaluate_residual(trial, solved)).size + bound_drift(combine(Y, inside.along))
+        back = _bound_inverse(M)
+        a = _bound_product(back @ P, np.fmin(g, combine(Y, inside.values).size))
+        if code.part.is_square:
             a = np.where(np.array(known)[:, None], np.fmin(trial.radius, a), a)
         errors, matrix, sizes = code.compute(trial, wide)
         F = size.sum(axis=-1, keepdims=True) * matrix[:, None, None] * np.ones(p)
-        noise, rates = _times(size, errors), J.size
+        noise, rates = _bound_product(size, errors), J.size
         rounding = (4 + len(trial.part.driven)) * UNIT_ROUNDOFF * sizes
-        outer = _inverse_bound(M + F)
+        outer = _bound_inverse(M + F)
 
         def step(e: Array, off: Array) -> Array:
             """Return the error e after a step; ``off``: the distance of the matrix's place from those between."""
-            return _times(outer, _times(_weigh(Q, off) + F, e) + noise) + rounding
+            return _bound_product(outer, _bound_product(_weigh(Q, off) + F, e) + noise) + rounding
 
         # 2, 3. one step after another, each with a second one by the same matrix; whether equations that are not solved
         # hold is left to the program
         steps, alive = np.zeros(c, dtype=int), np.all(a <= wide, axis=-1)
         e = a + rounding
-        for count in range(1, NEWTON_STEPS_AT_RUN + 1):
+        for count in range(1, GENERATED_NEWTON_STEPS_MAX + 1):
             first = step(e, e / 2)
             second = step(first, e + first / 2)
-            alive &= _within(first, wide - a) & _within(second, wide - a)
+            alive &= _check_within(first, wide - a) & _check_within(second, wide - a)
             ends = (
-                _within(e + first, near)
-                & _within(first + second, last)
-                & np.all(_times(rates, first) + errors <= code.closed, axis=-1)
+                _check_within(e + first, near)
+                & _check_within(first + second, last)
+                & np.all(_bound_product(rates, first) + errors <= code.closed, axis=-1)
             )
             steps[alive & ends & (steps == 0)] = count
             e = np.maximum(first, second)
         # 4. what an answer is worth: the program's tube is wider by a step that is near
         s = np.broadcast_to(last, e.shape)
-        off = _times(back, _times(one + M + F, s) + noise) + near
-        error = _times(back, _times(_weigh(Q, off) + F, s) + noise) + rounding
+        off = _bound_product(back, _bound_product(one + M + F, s) + noise) + near
+        error = _bound_product(back, _bound_product(_weigh(Q, off) + F, s) + noise) + rounding
         tube = np.maximum(trial.radius, a) + near
-        error[~(np.all(a <= wide, axis=-1) & _within(tube + off, wide - last))] = np.inf
+        error[~(np.all(a <= wide, axis=-1) & _check_within(tube + off, wide - last))] = np.inf
         error[~np.isfinite(error)] = np.inf
         alone = np.all(np.isfinite(back), axis=(-1, -2))
     inner = np.where(a <= wide, a, np.inf)
     return [BoundedCell(*each) for each in zip(cells, steps.tolist(), error, inner, alone.tolist(), strict=True)]
 
 
-def _level(B: AffineForms, motors: int) -> tuple[Array, Array]:
+def _bound_matrices(B: AffineForms, motors: int) -> tuple[Array, Array]:
     """Return for matrices B = 1 + Σ N_k ε_k + … (c, p, p), the first symbols those of the motors: P B with P = 1 − Σ
     N_k ε_k, a bound of |P|, and one of |1 − P B|."""
     p = B.r.shape[-1]
@@ -341,7 +356,7 @@ def _level(B: AffineForms, motors: int) -> tuple[Array, Array]:
     return P.size, (np.eye(p) - made).size
 
 
-def _curvature_bounds(solved: Sequence[LoopEquation], trial: TubeTrial, radius: Array, Y: Array, P: Array) -> Array:
+def _bound_curvature(solved: Sequence[LoopEquation], trial: TubeTrial, radius: Array, Y: Array, P: Array) -> Array:
     """Bounds (c, p, p, p) of |Y D²_xG|, the last two dimensions the unknowns."""
     forms, unknowns = trial.forms(radius), np.array(trial.part.unknowns, dtype=np.intp)
     carrier, like, p = SweptChains(trial.part.system, forms), forms[unknowns[0]] * 0.0, len(unknowns)
@@ -349,14 +364,16 @@ def _curvature_bounds(solved: Sequence[LoopEquation], trial: TubeTrial, radius: 
     for each in solved:
         bend = Total(like, (len(forms), len(forms)))
         if each.row is not None and isinstance(each.of, JointLoop):  # gears are linear
-            add_bend(bend, row_product(carrier, each.of, each.row))
+            add_bend(bend, build_row_product(carrier, each.of, each.row))
         rows.append(bend.sum[..., unknowns[i], unknowns[j]])
     found = np.empty((len(trial.x), p, p, p))
     found[..., i, j] = found[..., j, i] = P @ combine(Y, stack(rows, axis=-2)).size
     return found
 
 
-def platform_error(branch: TubedBranch, ranges: Array, errors: Array, function: TracedFunction) -> tuple[float, float]:
+def bound_platform_error(
+    branch: TubedBranch, ranges: Array, errors: Array, function: TracedFunction
+) -> tuple[float, float]:
     """Return the largest difference of the platform's rotation (entries) and position (m) from those at the closure:
     ``ranges`` (2, p) of the unknowns, ``errors`` (p,) of them."""
     q = [RoundedNumber.between(low, high) for low, high in zip(branch.lower, branch.upper, strict=True)]
@@ -368,7 +385,7 @@ def platform_error(branch: TubedBranch, ranges: Array, errors: Array, function: 
     return rotation, position
 
 
-def _times(M: Array, v: Array) -> Array:
+def _bound_product(M: Array, v: Array) -> Array:
     """M v for matrices (c, k, p) and vectors (c, p) of bounds, rounded up."""
     return np.asarray((M @ v[..., None])[..., 0] * BOUND_ROUNDING)
 
@@ -378,21 +395,21 @@ def _weigh(Q: Array, v: Array) -> Array:
     return np.asarray((Q @ v[:, None, :, None])[..., 0])
 
 
-def _within(e: Array, limit: Array) -> NDArray[np.bool_]:
+def _check_within(e: Array, limit: Array) -> NDArray[np.bool_]:
     """Return True for rows (c,) of a bound (c, p) that are at most a limit."""
     return np.asarray(np.all(e * BOUND_ROUNDING <= limit, axis=-1))
 
 
-def _inverse_bound(M: Array) -> Array:
+def _bound_inverse(M: Array) -> Array:
     """A bound (c, p, p) of |(1 − E)⁻¹| for all |E| ≤ M, nan where there is none: with v > 0 and M v < v it is at most
     N = (1 − M)⁻¹ ≥ 0, and with S ≥ 0 in floats and |1 − (1 − M) S| ≤ D, ‖D‖ = d < 1, N ≤ S (1 − D)⁻¹."""
     p = M.shape[-1]
     one = np.eye(p)
     good = np.all(np.isfinite(M), axis=(-1, -2))
     safe = np.where(good[:, None, None], M, 0.0)
-    S = np.abs(inverses(one - safe))
+    S = np.abs(invert_matrices(one - safe))
     v = S.sum(axis=-1)
-    good &= np.all(_times(safe, v) * (1 + AFFINE_ROUNDING) < v, axis=-1)
+    good &= np.all(_bound_product(safe, v) * (1 + AFFINE_ROUNDING) < v, axis=-1)
     D = np.abs(one - (one - safe) @ S) + AFFINE_ROUNDING * p * (one + safe) @ S
     d = D.sum(axis=-1).max(axis=-1)
     good &= d < 0.5

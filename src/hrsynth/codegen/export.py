@@ -9,9 +9,9 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from ..analysis.analysis_declaration import analysis
 from ..analysis.branch.answer import BACK, BranchLimit, BranchProof
-from ..analysis.branch.proof import BoxLike, Cells, MotorBox, branch, parsed_box
-from ..analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, as_robot, as_texts
-from ..budgets import BRANCH_CELLS
+from ..analysis.branch.proof import BoxLike, Cells, MotorBox, branch, parse_box
+from ..analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, normalise_texts, read_robot
+from ..budgets import BRANCH_CELLS_MAX
 from ..errors import BadRequest, HrsynthError
 from ..geometry.vectors import Array
 from ..mechanism.observations.direction import Direction
@@ -19,10 +19,10 @@ from ..options import option
 from ..progress import report
 from ..records import Recorded, Shown, Table, recorded
 from ..results import Result
-from ..tolerances import GENERATED_CLOSED, GENERATED_LAST_STEP
+from ..tolerances import GENERATED_CLOSURE_TOL, GENERATED_LAST_STEP_MAX
 from .branch_cells import TubedBranch
-from .inverse import closed_inverse
-from .languages import TEMPLATES, program
+from .inverse import find_closed_inverse
+from .languages import TEMPLATES, render_program
 from .source import ProvedBounds, Source
 
 
@@ -121,7 +121,7 @@ def export(
     *,
     observe: LegsLike = None,
     camera: CameraLike = None,
-    max_cells: Cells = BRANCH_CELLS,
+    max_cells: Cells = BRANCH_CELLS_MAX,
 ) -> ExportedCode:
     """Code for a controller: forward and inverse kinematics and Jacobians, on the branch of the zero configuration.
 
@@ -150,13 +150,13 @@ def export(
     ------
     BadRequest
         Unknown language or name, or an observation that is not a direction.
-    NothingProved
+    NoProvedCell
         No cell of the branch is proved.
 
     Notes
     -----
-    The program returns results where :func:`.branch` proves the branch and refuses other motor values. The same robot
-    gives the same text on one machine. Equations: docs/pages/proofs.md.
+    The program returns results where :func:`.format_branch` proves the branch and refuses other motor values. The same
+    robot gives the same text on one machine. Equations: docs/pages/proofs.md.
 
     Examples
     --------
@@ -165,18 +165,18 @@ def export(
     """
     if lang not in TEMPLATES:
         raise BadRequest("--lang", lang, tuple(TEMPLATES))
-    given = as_robot(robot)
-    watched = _watched_directions(given, observe, camera)
+    given = read_robot(robot)
+    watched = _list_observed_directions(given, observe, camera)
     proof = branch(given, box, max_cells=max_cells)
     if not proof.parts:
         raise BadRequest(
             f"{proof.robot.name}: the motors move no kinematic loop", remedy="Choose a robot with kinematic loops."
         )
     report("code")
-    branch_ = TubedBranch.of(proof, parsed_box(box))
+    branch_ = TubedBranch.of(proof, parse_box(box))
     moved = proof.robot not in (given, getattr(given, "robot", None))
-    source = Source.of(branch_, watched, closed_inverse(proof.robot if moved else given, proof, branch_))
-    code = program(source, lang, _describe_program(proof, source, lang, box, max_cells, as_texts(camera)))
+    source = Source.of(branch_, watched, find_closed_inverse(proof.robot if moved else given, proof, branch_))
+    code = render_program(source, lang, _describe_program(proof, source, lang, box, max_cells, normalise_texts(camera)))
     return ExportedCode(
         proof,
         lang,
@@ -185,11 +185,11 @@ def export(
         source.bounds,
         sum(len(part.bounded) for part in source.parts),
         code,
-        _free(proof, branch_),
+        _list_free_motors(proof, branch_),
     )
 
 
-def _watched_directions(robot: Any, observe: LegsLike, camera: CameraLike) -> tuple[Direction, ...]:
+def _list_observed_directions(robot: Any, observe: LegsLike, camera: CameraLike) -> tuple[Direction, ...]:
     """Return the observed directions, as seen from the base; by default none if a robot has no observable legs. Raises
     ``BadRequest`` if something else is observed."""
     try:
@@ -211,7 +211,7 @@ def _watched_directions(robot: Any, observe: LegsLike, camera: CameraLike) -> tu
     )
 
 
-def _free(proof: BranchProof, branch_: TubedBranch) -> tuple[FreeMotor, ...]:
+def _list_free_motors(proof: BranchProof, branch_: TubedBranch) -> tuple[FreeMotor, ...]:
     """Return the motors in no loop, with their intervals."""
     moving = {name for part in proof.parts for name in part.motors}
     return tuple(
@@ -239,7 +239,7 @@ def _describe_program(
             ("observe", legs),
             *(("camera", each) for each in camera),
             ("box", asked),
-            ("max-cells", "" if max_cells == BRANCH_CELLS else str(max_cells)),
+            ("max-cells", "" if max_cells == BRANCH_CELLS_MAX else str(max_cells)),
         )
         if value
         for word in (f"--{name}", value)
@@ -263,15 +263,15 @@ def _describe_program(
             "the cells are refused. Fully covered:"
         )
         lines += [f"  {name}: {a!r} to {b!r}" for name, a, b in zip(part.motors, low, high, strict=True)]
-    free = [name for name, _, _ in _free(proof, branch_)]
+    free = [name for name, _, _ in _list_free_motors(proof, branch_)]
     lines += [f"Motors in no loop, which only poses depend on: {', '.join(free)}."] * bool(free)
     lines += [
-        f"A result is given if the last step of Newton's method is at most {GENERATED_LAST_STEP:g} (rad, or "
+        f"A result is given if the last step of Newton's method is at most {GENERATED_LAST_STEP_MAX:g} (rad, or "
         f"of {robot.length:.6g} m,",
         "the characteristic length: mean distance of the joint centres of the file from their mean), all loops are",
-        f"closed to {GENERATED_CLOSED:g} (cosines, or of {branch_.far:.6g} m), and the joints are in the cell's "
+        f"closed to {GENERATED_CLOSURE_TOL:g} (cosines, or of {branch_.far:.6g} m), and the joints are in the cell's "
         "tube, in which the loops have one closure (proved).",
-        *_bounds(source),
+        *_describe_bounds(source),
         "The proof takes the robot's numbers as the file has them.",
     ]
     used = {branch_.system.coordinates[i].joint for i in (*branch_.motors, *branch_.passive)}
@@ -289,7 +289,7 @@ def _describe_program(
     return lines
 
 
-def _bounds(source: Source) -> list[str]:
+def _describe_bounds(source: Source) -> list[str]:
     """Return the proved bounds of Newton's method in it."""
     if source.bounds is None:
         return ["The number of steps and the error of results is not proved in all cells."]

@@ -9,19 +9,21 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.branch.loops import JointLoop, LoopSystem, Swept, residuals, rotate
-from ..geometry.affine import dot_product
+from ..analysis.branch.loops import JointLoop, LoopSystem, Swept, evaluate_residuals, rotate
+from ..geometry.affine import compute_dot_forms
 from ..geometry.components import arctan2
-from ..geometry.vectors import plane_axes
+from ..geometry.vectors import build_plane_axes
 from ..mechanism import Joint, JointType
 
 Row = tuple[Any, dict[int, Any]]
 """A value and its derivatives by the coordinates that it depends on, arrays of one number or symbol."""
 
 
-def rows(system: LoopSystem, values: Sequence[Any]) -> list[Row]:
+def list_equation_rows(system: LoopSystem, values: Sequence[Any]) -> list[Row]:
     """All equations, loop by loop, then gears; ``values`` are arrays (1,), None for those at zero."""
-    found = [row for loop in system.loops for row in zip(*residuals(system, loop, values, loop.rows), strict=True)]
+    found = [
+        row for loop in system.loops for row in zip(*evaluate_residuals(system, loop, values, loop.rows), strict=True)
+    ]
     for gear in system.gears:
         pair = [(i, rate) for i, rate in ((gear.second, 1.0), (gear.first, -gear.ratio)) if values[i] is not None]
         terms = (system.coordinates[i].from_zero(values[i]) * rate for i, rate in pair)
@@ -72,11 +74,11 @@ def cut_coordinate(system: LoopSystem, values: Sequence[Any], loop: JointLoop, w
     ]
     axis = rotate(one.R, joint.axis)
     zero = 0.0 if joint.offset is None else float(joint.offset[which])
-    if joint.type.slides and which == 0:
+    if joint.type.has_translation and which == 0:
         # d/dq n·(B − A) = n·(v_B − v_A'), A' the point of the first body at B: n turns with that body
         A, B = one.at(loop.point), other.at(loop.point)
-        return dot_product(axis, B - A) + zero, {
-            i: dot_product(axis, swept.rate(place, B)) * sign for place, i, swept, sign in sides
+        return compute_dot_forms(axis, B - A) + zero, {
+            i: compute_dot_forms(axis, swept.rate(place, B)) * sign for place, i, swept, sign in sides
         }
     if joint.type is JointType.UNIVERSAL:
         first, second = joint.axes
@@ -88,10 +90,10 @@ def cut_coordinate(system: LoopSystem, values: Sequence[Any], loop: JointLoop, w
         else:
             start, moved, across = rotate(one.R, second), rotate(other.R, second), rotate(one.R, flat)
     else:
-        normal, side = plane_axes(joint.axis)
+        normal, side = build_plane_axes(joint.axis)
         start, moved, across = rotate(one.R, normal), rotate(other.R, normal), rotate(one.R, side)
     # d(turn) = axis·(ω_B − ω_A), the other axis of a U being normal to this one
-    turn = arctan2(*(np.ravel(dot_product(each, moved))[0] for each in (across, start)))
+    turn = arctan2(*(np.ravel(compute_dot_forms(each, moved))[0] for each in (across, start)))
     return turn + zero if zero else turn, {
-        i: dot_product(axis, _turn(swept, place)) * sign for place, i, swept, sign in sides
+        i: compute_dot_forms(axis, _turn(swept, place)) * sign for place, i, swept, sign in sides
     }

@@ -9,26 +9,26 @@ from typing import Any
 import numpy as np
 
 from ..analysis.branch.answer import BranchProof
-from ..analysis.branch.loop_parts import parts_of
+from ..analysis.branch.loop_parts import split_loop_system
 from ..analysis.branch.loops import TreeCoordinate
 from ..analysis.observed import ObservedRobot, RobotLike
 from ..batch.engine import Batch
 from ..batch.tape import Tape
-from ..closed_forms.legs import ClosedFormLeg, OnCrank, OnRod, Pinned, PlatformDirection, RailAndLine, SlidingRod
+from ..closed_forms.legs import ClosedFormLeg, OnCrank, OnRod, PinnedRod, PlatformDirection, RailAndLine, SlidingRod
 from ..closed_forms.platform_points import PlatformPoint
 from ..errors import HrsynthError
 from ..geometry.components import Components, arctan2, dot, minus, plus, scale, transform_vector
 from ..geometry.components import cross as cross_
-from ..geometry.vectors import Array, cross, perpendicular
-from ..geometry.vectors import inverse as inverted
+from ..geometry.vectors import Array, cross, find_perpendicular
+from ..geometry.vectors import invert_pose as inverted
 from ..mechanism import JointType, Mechanism
 from ..mechanism.legs import Leg
 from ..results import Value
-from ..tolerances import SAME_GEOMETRY
+from ..tolerances import GEOMETRY_DIFFERENCE_TOL
 from .branch_cells import TubedBranch
 from .trace import TracedFunction
 
-SAMPLES = 64
+INVERSE_CHECK_SAMPLES_COUNT = 64
 """Motors that closed forms must give back."""
 
 
@@ -55,24 +55,24 @@ class LegMotor(Value):
         if isinstance(form, PlatformDirection):
             found = transform_vector(R, form.axis)
             if self.reads == "end":
-                margin, found = form.at(tip, _itself, form.mode, *found)
+                margin, found = form.at(tip, _return_value, form.mode, *found)
         elif isinstance(form, RailAndLine):
             margin, found = form.at(
-                tip, _itself, form.mode, *(transform_vector(R, form.normal) if form.turns else form.normal)
+                tip, _return_value, form.mode, *(transform_vector(R, form.normal) if form.turns else form.normal)
             )
         else:
-            margin, found = form.at(tip, _itself, form.mode)
+            margin, found = form.at(tip, _return_value, form.mode)
         if self.reads == "length":
             return margin, dot(found, minus(tip, form.centre))
         if self.reads == "end":
             return margin, minus(found, self.coordinate.point)
-        if not isinstance(form, OnRod | Pinned):
+        if not isinstance(form, OnRod | PinnedRod):
             return margin, found
-        rod = transform_vector(R, form.axis) if isinstance(form, Pinned) else minus(tip, found)
+        rod = transform_vector(R, form.axis) if isinstance(form, PinnedRod) else minus(tip, found)
         if self.reads == "direction":
             return margin, rod
         axis, spoke = self.coordinate.axis, minus(found, form.centre)
-        across = perpendicular(axis)
+        across = find_perpendicular(axis)
         return margin, plus(scale(dot(spoke, rod), across), scale(dot(cross_(spoke, rod), axis), cross(axis, across)))
 
     def at(self, position: Components, R: Components) -> tuple[Any, Any]:
@@ -103,11 +103,11 @@ def trace_inverse(rules: Sequence[LegMotor]) -> TracedFunction:
     return TracedFunction.of(tape, [*(f"r[{k}]" for k in range(9)), *(f"p[{k}]" for k in range(3))], stores)
 
 
-def _itself(value: Any) -> Any:
+def _return_value(value: Any) -> Any:
     return value
 
 
-def closed_inverse(robot: RobotLike, proof: BranchProof, branch: TubedBranch) -> tuple[LegMotor, ...]:
+def find_closed_inverse(robot: RobotLike, proof: BranchProof, branch: TubedBranch) -> tuple[LegMotor, ...]:
     """A closed form for each motor, in the working mode of the zero configuration; none where a leg has none, or where
     the working mode is not proved to be the same in all cells (no Type 1 singularity in the box that they fill)."""
     if not proof.regular or any(part.volume_fraction > part.box_fraction for part in proof.parts):
@@ -119,12 +119,12 @@ def closed_inverse(robot: RobotLike, proof: BranchProof, branch: TubedBranch) ->
         return ()
     if batch is None:
         return ()
-    q, X = _samples(proof, branch)
+    q, X = _sample_motors(proof, branch)
     found = []
     for k, i in enumerate(branch.motors):
         coordinate = branch.system.coordinates[i]
-        forms = _forms(observed, batch, branch.system.mechanism, coordinate)
-        rules = (_rule(coordinate, form, reads, batch, X, q[:, k]) for form, reads in forms)
+        forms = _list_forms(observed, batch, branch.system.mechanism, coordinate)
+        rules = (_find_rule(coordinate, form, reads, batch, X, q[:, k]) for form, reads in forms)
         rule = next((each for each in rules if each is not None), None)
         if rule is None:
             return ()
@@ -132,16 +132,16 @@ def closed_inverse(robot: RobotLike, proof: BranchProof, branch: TubedBranch) ->
     return tuple(found)
 
 
-def _samples(proof: BranchProof, branch: TubedBranch) -> tuple[Array, Array]:
+def _sample_motors(proof: BranchProof, branch: TubedBranch) -> tuple[Array, Array]:
     """Motors (n, m) in the proved box, zero first, and the poses (n, 4, 4) of the platform's frame on the branch."""
     low, high = proof.proved
     system = proof.system
-    q = np.random.default_rng(0).uniform(low, high, (SAMPLES, len(low)))
+    q = np.random.default_rng(0).uniform(low, high, (INVERSE_CHECK_SAMPLES_COUNT, len(low)))
     place = {name: i for i, name in enumerate(system.names)}
-    values = np.tile(system.zero * system.units, (SAMPLES, 1))
+    values = np.tile(system.zero * system.units, (INVERSE_CHECK_SAMPLES_COUNT, 1))
     q[0] = values[0, [place[name] for name in proof.motors]]
     values[:, [place[name] for name in proof.motors]] = q
-    for part, loops in zip(proof.parts, parts_of(system)[0], strict=True):
+    for part, loops in zip(proof.parts, split_loop_system(system)[0], strict=True):
         near = [cell.at(row) for row in values[:, loops.driven] if (cell := part.find(row)) is not None]
         units = system.units[list(loops.unknowns)]
         values[:, loops.unknowns] = (
@@ -151,7 +151,7 @@ def _samples(proof: BranchProof, branch: TubedBranch) -> tuple[Array, Array]:
     return q, np.array([system.pose(system.mechanism.platform, row.tolist()) for row in values])
 
 
-def _forms(
+def _list_forms(
     observed: ObservedRobot, batch: Batch, mechanism: Mechanism, coordinate: TreeCoordinate
 ) -> Iterator[tuple[ClosedFormLeg, str]]:
     """Yield forms that may determine a coordinate, and the part of them that is read."""
@@ -161,7 +161,7 @@ def _forms(
         crank = joint.other(mechanism.base)
         for each in mechanism.joints_of(crank):
             if mechanism.platform in each.links:
-                yield Pinned(motor, _of_platform(batch, mechanism, each.point), axis=coordinate.axis), "end"
+                yield PinnedRod(motor, _locate_on_platform(batch, mechanism, each.point), axis=coordinate.axis), "end"
     for leg in observed.decomposition.legs:
         form = batch.legs[leg.label]
         if motor not in leg.joints or not isinstance(form, ClosedFormLeg):
@@ -174,9 +174,9 @@ def _forms(
             if mechanism.platform in joint.links:
                 for name in leg.joints:
                     yield (
-                        Pinned(
+                        PinnedRod(
                             motor,
-                            _of_platform(batch, mechanism, joint.point),
+                            _locate_on_platform(batch, mechanism, joint.point),
                             axis=form.axis,
                             centre=mechanism.joints[name].point,
                         ),
@@ -186,16 +186,16 @@ def _forms(
                 yield replace(form, centre=mechanism.joints[name].point, radius=0.0), "length"
         if isinstance(form, SlidingRod | PlatformDirection):
             yield form, "length" if coordinate.slides else "direction"
-        yield from ((each, "end") for each in _on_rail(batch, mechanism, leg, coordinate))
+        yield from ((each, "end") for each in _list_rail_forms(batch, mechanism, leg, coordinate))
 
 
-def _of_platform(batch: Batch, mechanism: Mechanism, place: Array) -> PlatformPoint:
+def _locate_on_platform(batch: Batch, mechanism: Mechanism, place: Array) -> PlatformPoint:
     """A point that is fixed in the platform's link, by its place at zero."""
     X = mechanism.links[mechanism.platform].pose
     return PlatformPoint(True, (inverted(X) @ np.append(place, 1.0))[:3] - batch.coordinates.point, np.zeros(3))
 
 
-def _on_rail(batch: Batch, mechanism: Mechanism, leg: Leg, coordinate: TreeCoordinate) -> Iterator[RailAndLine]:
+def _list_rail_forms(batch: Batch, mechanism: Mechanism, leg: Leg, coordinate: TreeCoordinate) -> Iterator[RailAndLine]:
     """A slider of the base, an R and a P to the platform, in any order: the line along the P goes with the platform, or
     with the slider."""
     joints = [mechanism.joints[name] for name in leg.joints if name != coordinate.joint]
@@ -203,7 +203,7 @@ def _on_rail(batch: Batch, mechanism: Mechanism, leg: Leg, coordinate: TreeCoord
         return
     slide, turn = sorted(joints, key=lambda each: each.type is JointType.REVOLUTE)
     R, normal = mechanism.links[mechanism.platform].pose[:3, :3], cross(slide.axis, turn.axis)
-    tip = _of_platform(batch, mechanism, turn.point)
+    tip = _locate_on_platform(batch, mechanism, turn.point)
     for turns in (False, True):
         yield RailAndLine(
             leg.label,
@@ -215,7 +215,7 @@ def _on_rail(batch: Batch, mechanism: Mechanism, leg: Leg, coordinate: TreeCoord
         )
 
 
-def _rule(
+def _find_rule(
     coordinate: TreeCoordinate, form: ClosedFormLeg, reads: str, batch: Batch, X: Array, q: Array
 ) -> LegMotor | None:
     """The closed form of a coordinate that gives motors q (n,), the first of them zero, but for whole turns, at their
@@ -229,6 +229,6 @@ def _rule(
         off = found - q
         if not coordinate.slides:  # the program finds the turn that lies in the box
             off = off - 2 * np.pi * np.round(off / (2 * np.pi))
-        if not (np.all(np.asarray(margin) > 0) and np.all(np.abs(off) <= SAME_GEOMETRY)):
+        if not (np.all(np.asarray(margin) > 0) and np.all(np.abs(off) <= GEOMETRY_DIFFERENCE_TOL)):
             return None
     return rule

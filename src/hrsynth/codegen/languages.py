@@ -11,13 +11,13 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..budgets import INVERSE_STEPS_AT_RUN, NEWTON_STEPS_AT_RUN
+from ..budgets import GENERATED_INVERSE_STEPS_MAX, GENERATED_NEWTON_STEPS_MAX
 from ..characters import name_steering
 from ..tolerances import (
-    GENERATED_LAST_STEP,
-    GENERATED_NEAR,
-    GENERATED_REACHED,
-    GENERATED_SINGULAR,
+    GENERATED_LAST_STEP_MAX,
+    GENERATED_NEWTON_STEP_TOL,
+    GENERATED_PIVOT_MIN_FRACTION,
+    GENERATED_POSE_TOL,
 )
 from .inverse import trace_inverse
 from .source import Source
@@ -52,34 +52,34 @@ RESERVED = re.compile(
 """Types, macros and function families of the C library, and names of the compiler (``__linux__``)."""
 
 
-def namespace(name: str) -> str:
+def make_namespace(name: str) -> str:
     """Return the name of a robot as a namespace of C++."""
     found = re.sub(r"[^0-9A-Za-z_]|^(?=\d)", "_", name) or "robot"
-    taken = found in TAKEN or found in _c_names() or RESERVED.fullmatch(found)
+    taken = found in TAKEN or found in _list_c_names() or RESERVED.fullmatch(found)
     return f"{found}_" if taken else found
 
 
 @cache
-def _c_names() -> frozenset[str]:
+def _list_c_names() -> frozenset[str]:
     """Return the names of the C library's functions."""
     text = Path(__file__).with_name("c_names.toml").read_text(encoding="utf-8")
     return frozenset(tomllib.loads(text)["names"].split())
 
 
-def _comment(text: str) -> str:
+def _format_comment(text: str) -> str:
     """Return a text that is safe in a comment: it neither ends nor continues it, and selects no encoding."""
     line = "".join(each if each.isprintable() and each != "\\" else "_" for each in text)
     return re.sub(r"coding(?=[:=])", "coding ", line)
 
 
-def _unused_arguments(arguments: str, function: TracedFunction) -> str:
+def _list_unused_arguments(arguments: str, function: TracedFunction) -> str:
     """Return the arguments that a C++ function may not use, as written after ``(void)``."""
     stored = {array for array, _, _ in function.stores}
     names = re.findall(r"& (\w+)", arguments)
     return ", (void)".join(name for name in names if name not in stored)
 
 
-def program(source: Source, language: str, told: Sequence[str]) -> str:
+def render_program(source: Source, language: str, told: Sequence[str]) -> str:
     """Render the program in a language, with header lines ``told``; deterministic."""
     branch, mechanism = source.branch, source.branch.system.mechanism
     arguments = "const Motors& q, const Unknowns& x, "
@@ -99,14 +99,14 @@ def program(source: Source, language: str, told: Sequence[str]) -> str:
     values: dict[str, Any] = {
         "robot": mechanism.name,
         "told": told,
-        "name": namespace(mechanism.name),
+        "name": make_namespace(mechanism.name),
         "source": source,
         "m": len(branch.motors),
         "p": len(branch.passive),
         "c": len(source.cut),
         "d": d,
-        "steps": source.bounds.steps if source.bounds else NEWTON_STEPS_AT_RUN,
-        "inverse": INVERSE_STEPS_AT_RUN,
+        "steps": source.bounds.steps if source.bounds else GENERATED_NEWTON_STEPS_MAX,
+        "inverse": GENERATED_INVERSE_STEPS_MAX,
         "parts": source.parts,
         "functions": functions,
         "lower": [float(x) for x in branch.lower],
@@ -117,26 +117,26 @@ def program(source: Source, language: str, told: Sequence[str]) -> str:
         "direction_names": [observation.leg for observation in source.observed],
         "turning": [int(not branch.system.coordinates[i].slides) for i in branch.motors],
         "length": repr(float(mechanism.length)),
-        "near": GENERATED_NEAR,
-        "last_step": GENERATED_LAST_STEP,
+        "near": GENERATED_NEWTON_STEP_TOL,
+        "last_step": GENERATED_LAST_STEP_MAX,
         "legs": source.legs and trace_inverse(source.legs),
         "far": repr(branch.far),
-        "reached": GENERATED_REACHED,
+        "reached": GENERATED_POSE_TOL,
         "turn": repr(2 * math.pi),
-        "singular": GENERATED_SINGULAR,
+        "singular": GENERATED_PIVOT_MIN_FRACTION,
     }
-    return name_steering(_templates().get_template(TEMPLATES[language]).render(**values))
+    return name_steering(_load_templates().get_template(TEMPLATES[language]).render(**values))
 
 
 @cache
-def _templates() -> Environment:
+def _load_templates() -> Environment:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     made = Environment(
         loader=PackageLoader("hrsynth.codegen", ""), undefined=StrictUndefined, keep_trailing_newline=True
     )
     made.filters["quoted"] = lambda names: ", ".join(json.dumps(name, ensure_ascii=False) for name in names)
-    made.filters["comment"] = _comment
-    made.filters["unused"] = _unused_arguments
+    made.filters["comment"] = _format_comment
+    made.filters["unused"] = _list_unused_arguments
     made.filters["name_of"] = lambda place, names: names[place]
     return made

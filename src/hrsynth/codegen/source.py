@@ -11,8 +11,8 @@ import numpy as np
 from ..mechanism.observations.direction import Direction
 from ..results import Value
 from .branch_cells import TubedBranch, TubePart
-from .cell_tree import Node, cell_tree, tree_depth
-from .convergence import BoundedCell, bounded_cells, platform_error
+from .cell_tree import Node, build_cell_tree, compute_tree_depth
+from .convergence import BoundedCell, bound_cells, bound_platform_error
 from .inverse import LegMotor
 from .trace import FormulaTracer, TracedFunction
 
@@ -94,7 +94,7 @@ class Source(Value):
     def of(cls, branch: TubedBranch, observed: Sequence[Direction], legs: Sequence[LegMotor] = ()) -> Source:
         """The formulas of a branch, those of observed directions and of the motors of a pose."""
         tracer = FormulaTracer(branch.system, branch.motors, branch.passive)
-        parts = tuple(_part(branch, tracer, part) for part in branch.parts)
+        parts = tuple(_build_part(branch, tracer, part) for part in branch.parts)
         names, values, slopes = tracer.cut()
         platform = tracer.platform()
         return cls(
@@ -107,7 +107,7 @@ class Source(Value):
             tracer.rates(observed),
             tuple(observed),
             tuple(legs),
-            _proved_bounds(branch, parts, platform),
+            _combine_bounds(branch, parts, platform),
         )
 
     def names(self, places: Sequence[int]) -> list[str]:
@@ -115,18 +115,18 @@ class Source(Value):
         return [self.branch.system.coordinates[i].name for i in places]
 
 
-def _part(branch: TubedBranch, tracer: FormulaTracer, part: TubePart) -> SourcePart:
+def _build_part(branch: TubedBranch, tracer: FormulaTracer, part: TubePart) -> SourcePart:
     driven = [branch.motors.index(i) for i in part.driven]
-    rows, every, sparse = _rows(branch, part)
+    rows, every, sparse = _choose_rows(branch, part)
     part = part.ordered(sparse)
     unknowns = [branch.passive.index(i) for i in part.unknowns]
     equations, slopes = tracer.loops(rows, part.unknowns, part.driven)
     lower, upper = branch.lower[driven], branch.upper[driven]
     closure, own = tracer.closure(every), [every.index(i) for i in rows]
-    bounded = bounded_cells(branch, part, rows, own, equations, closure)
+    bounded = bound_cells(branch, part, rows, own, equations, closure)
     units = np.array([branch.unit(i) for i in part.unknowns])
     tried = [each.trial_cell(units) for each in bounded]
-    root, nodes = cell_tree(lower, upper, [(cell.lower, cell.upper) for cell in tried])
+    root, nodes = build_cell_tree(lower, upper, [(cell.lower, cell.upper) for cell in tried])
     cells = tuple(
         (tuple(cell.centre), tuple(cell.middle), tuple(cell.slopes.ravel()), tuple(cell.radius)) for cell in tried
     )
@@ -138,19 +138,19 @@ def _part(branch: TubedBranch, tracer: FormulaTracer, part: TubePart) -> SourceP
         closure,
         tuple(own),
         len(every),
-        _floats(tuple(branch.closing_tolerance(every))),
+        _convert_to_floats(tuple(branch.closing_tolerance(every))),
         root,
         tuple(nodes),
-        tree_depth(root, nodes),
-        _floats(cells),
-        _floats(tuple(units)),
+        compute_tree_depth(root, nodes),
+        _convert_to_floats(cells),
+        _convert_to_floats(tuple(units)),
         tuple(map(float, lower)),
         tuple(map(float, upper)),
         tuple(bounded),
     )
 
 
-def _proved_bounds(branch: TubedBranch, parts: Sequence[SourcePart], platform: TracedFunction) -> ProvedBounds | None:
+def _combine_bounds(branch: TubedBranch, parts: Sequence[SourcePart], platform: TracedFunction) -> ProvedBounds | None:
     """The bounds of all parts together."""
     every = [each for part in parts for each in part.bounded]
     if not all(each.steps and np.all(np.isfinite(each.error)) for each in every):
@@ -169,7 +169,7 @@ def _proved_bounds(branch: TubedBranch, parts: Sequence[SourcePart], platform: T
         ranges[1, places] = np.max(np.add(middles, reach), axis=0)
         errors[places] = np.max([each.error for each in part.bounded], axis=0)
         units[places] = part.units
-    rotation, position = platform_error(branch, ranges, errors, platform)
+    rotation, position = bound_platform_error(branch, ranges, errors, platform)
     return ProvedBounds(
         max(each.steps for each in every),
         float((errors / units).max()),
@@ -179,11 +179,11 @@ def _proved_bounds(branch: TubedBranch, parts: Sequence[SourcePart], platform: T
     )
 
 
-def _floats(values: Any) -> Any:
-    return tuple(map(_floats, values)) if isinstance(values, tuple) else float(values)
+def _convert_to_floats(values: Any) -> Any:
+    return tuple(map(_convert_to_floats, values)) if isinstance(values, tuple) else float(values)
 
 
-def _rows(branch: TubedBranch, part: TubePart) -> tuple[list[int], list[int], list[int]]:
+def _choose_rows(branch: TubedBranch, part: TubePart) -> tuple[list[int], list[int], list[int]]:
     """As many equations as unknowns, those that the proof solved, else the firmest at the middles of the part's cells
     together; all that have to do with the unknowns; the unknowns' places, those that few of the equations know first,
     so that elimination fills little."""
@@ -200,11 +200,11 @@ def _rows(branch: TubedBranch, part: TubePart) -> tuple[list[int], list[int], li
         stacked.append(branch.evaluate(q, x)[1][:, part.unknowns] * units)
     every = [i for i in range(len(stacked[0])) if any(np.any(each[i]) for each in stacked)]
     together = np.hstack(stacked)[every]
-    kept = [every.index(i) for i in part.solved] if part.exact else qr(together.T, pivoting=True, mode="r")[1]
+    kept = [every.index(i) for i in part.solved] if part.is_square else qr(together.T, pivoting=True, mode="r")[1]
     chosen: list[int] = []
     for k in kept:  # independent at the first cell as well
         trial = stacked[0][[every[i] for i in (*chosen, k)]]
-        if part.exact or np.linalg.matrix_rank(trial, tol=1e-6 * np.linalg.norm(trial, 2)) == len(trial):
+        if part.is_square or np.linalg.matrix_rank(trial, tol=1e-6 * np.linalg.norm(trial, 2)) == len(trial):
             chosen.append(int(k))
         if len(chosen) == len(part.unknowns):
             break

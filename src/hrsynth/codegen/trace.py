@@ -10,10 +10,10 @@ import numpy as np
 
 from ..analysis.branch.loops import LoopSystem, rotate
 from ..batch.tape import Symbol, Tape
-from ..geometry.affine import cross_product
+from ..geometry.affine import compute_cross_forms
 from ..mechanism.observations.direction import Direction
 from ..results import Value
-from .formulas import cut, cut_coordinate, place_frame, rows
+from .formulas import cut, cut_coordinate, list_equation_rows, place_frame
 
 Place = tuple[int, ...]
 VALUES = ("R", "p", "u", "O")
@@ -79,7 +79,7 @@ class FormulaTracer(Value):
     ) -> tuple[TracedFunction, TracedFunction]:
         """G with J, its derivatives by ``unknowns``; K, those by ``driven`` coordinates; of some equations."""
         tape = Tape([])
-        found = rows(self.system, self._values(tape))
+        found = list_equation_rows(self.system, self._values(tape))
         stores: list[tuple[str, Place, Any]] = [("G", (i,), found[row][0]) for i, row in enumerate(which)]
         slopes: list[list[tuple[str, Place, Any]]] = []
         for array, columns in (("J", unknowns), ("K", driven)):
@@ -97,7 +97,7 @@ class FormulaTracer(Value):
     def closure(self, which: Sequence[int]) -> TracedFunction:
         """E, what is left of some equations."""
         tape = Tape([])
-        found = rows(self.system, self._values(tape))
+        found = list_equation_rows(self.system, self._values(tape))
         return TracedFunction.of(tape, self.names, [("E", (i,), found[row][0]) for i, row in enumerate(which)])
 
     def platform(self) -> TracedFunction:
@@ -105,7 +105,9 @@ class FormulaTracer(Value):
         tape = Tape([])
         R, p, _ = place_frame(self.system, self._values(tape), self.system.mechanism.platform)
         return TracedFunction.of(
-            tape, self.names, [*(("R", divmod(i, 3), each) for i, each in enumerate(R.ravel())), *_three("p", 0, p)]
+            tape,
+            self.names,
+            [*(("R", divmod(i, 3), each) for i, each in enumerate(R.ravel())), *_place_components("p", 0, p)],
         )
 
     def cut(self) -> tuple[list[str], TracedFunction, TracedFunction]:
@@ -131,20 +133,23 @@ class FormulaTracer(Value):
         values = self._values(tape)
         twists = place_frame(self.system, values, mechanism.platform)[2]
         stores = [
-            store for k, twist in twists.items() for i in (0, 1) for store in _three("V", 3 * i, twist[i], places[k])
+            store
+            for k, twist in twists.items()
+            for i in (0, 1)
+            for store in _place_components("V", 3 * i, twist[i], places[k])
         ]
         for number, observation in enumerate(observed):
             R, _, twists = place_frame(self.system, values, observation.link)
             u = rotate(R, observation.direction)
-            stores += _three("u", 3 * number, u)
+            stores += _place_components("u", 3 * number, u)
             stores += [
                 store
                 for k, (_, w) in twists.items()
-                for store in _three("W", 3 * number, cross_product(w, u), places[k])
+                for store in _place_components("W", 3 * number, compute_cross_forms(w, u), places[k])
             ]
         return TracedFunction.of(tape, self.names, stores)
 
 
-def _three(array: str, first: int, vector: Any, *column: int) -> list[tuple[str, Place, Any]]:
+def _place_components(array: str, first: int, vector: Any, *column: int) -> list[tuple[str, Place, Any]]:
     """Return the stores of a vector's components: to places from ``first`` on."""
     return [(array, (first + i, *column), each) for i, each in enumerate(np.ravel(vector))]

@@ -15,15 +15,15 @@ from typing import Any
 import numpy as np
 
 from ..geometry.vectors import Array, hat
-from ..kinematics.locked_twists import interaction
+from ..kinematics.locked_twists import compute_interaction
 from ..kinematics.velocity_relation import ObservationModel
 from ..results import Value
-from ..tolerances import SAME_RELATION
-from .closed_conditions import closed_form
-from .locked_legs import LockedLeg, forbidden, projectors, stopped_turns
+from ..tolerances import RELATION_ANGLE_TOL
+from .closed_conditions import find_closed_form
+from .locked_legs import LockedLeg, compute_forbidden_projectors, compute_projectors, compute_rotation_projectors
 from .named_vectors import BodyVector, NamedVector, Tangent
 from .pattern import TURNING_MOTIONS, ConstraintPattern, PatternValues
-from .vector_algebra import evaluate, products, vector
+from .vector_algebra import evaluate, load_products, make_vector
 
 Values = Mapping[str, Array]
 
@@ -57,19 +57,23 @@ class Condition(Value):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Named(Condition):
+class NamedCondition(Condition):
     """A condition in vectors that have names."""
 
     pattern: ConstraintPattern = field(kw_only=True)
 
     def rows(self, here: PatternValues) -> Array:
-        return rows(self.pattern, here.values)
+        return compute_leg_rows(self.pattern, here.values)
 
     def evaluate(self, here: PatternValues) -> Array:
         import sympy
 
         if isinstance(self.expression, sympy.Determinant):
-            return np.linalg.det(plucker(self.pattern, here.values)) if self.signed else super().evaluate(here)
+            return (
+                np.linalg.det(compute_normal_lines(self.pattern, here.values))
+                if self.signed
+                else super().evaluate(here)
+            )
         found = evaluate(self.expression, here.values)
         return found if self.signed else np.sqrt(np.abs(found))
 
@@ -81,10 +85,10 @@ class General(Condition):
     observation_model: ObservationModel = field(kw_only=True)
 
     def rows(self, here: PatternValues) -> Array:
-        return np.array([interaction(at, self.observation_model) for at in here.configurations])
+        return np.array([compute_interaction(at, self.observation_model) for at in here.configurations])
 
 
-def rows(pattern: ConstraintPattern, values: Values) -> Array:
+def compute_leg_rows(pattern: ConstraintPattern, values: Values) -> Array:
     """The rows of all legs, and those that keep to a plane."""
     blocks = []
     some = values[pattern.legs[0].tip.symbol]
@@ -96,72 +100,74 @@ def rows(pattern: ConstraintPattern, values: Values) -> Array:
                 J = eye
             case "bodies":
                 moves = float(leg.body in pattern.bodies[1:])
-                J = np.concatenate([eye, moves * values[_symbol(pattern.slide)][:, :, None]], axis=2)
+                J = np.concatenate([eye, moves * values[_make_symbol(pattern.slide)][:, :, None]], axis=2)
             case _:
                 J = np.concatenate([eye, -hat(values[leg.tip.symbol])], axis=2)
-        blocks.append(forbidden(leg, values) @ J)
-        turns = stopped_turns(leg, values) if pattern.motion in TURNING_MOTIONS else None
+        blocks.append(compute_forbidden_projectors(leg, values) @ J)
+        turns = compute_rotation_projectors(leg, values) if pattern.motion in TURNING_MOTIONS else None
         if turns is not None:
             blocks.append(np.concatenate([np.zeros_like(turns), turns], axis=2))
     if pattern.motion == "planar":
-        n = values[_symbol(pattern.plane)]
+        n = values[_make_symbol(pattern.plane)]
         blocks.append(np.concatenate([n[:, None, :], np.zeros((len(n), 1, 3))], axis=2))
-        blocks.append(np.concatenate([zero, projectors(n)], axis=2))
+        blocks.append(np.concatenate([zero, compute_projectors(n)], axis=2))
     return np.concatenate(blocks, axis=1)
 
 
-def plucker(pattern: ConstraintPattern, values: Values) -> Array:
+def compute_normal_lines(pattern: ConstraintPattern, values: Values) -> Array:
     """The lines (n_i, B_i × n_i) through the tips along the legs' normals, (n, legs, 6)."""
-    pairs = [(values[_symbol(leg.normal)], values[leg.tip.symbol]) for leg in pattern.legs]
+    pairs = [(values[_make_symbol(leg.normal)], values[leg.tip.symbol]) for leg in pattern.legs]
     return np.stack([np.concatenate([n, np.cross(B, n)], axis=-1) for n, B in pairs], axis=1)
 
 
-def condition(pattern: ConstraintPattern, observation_model: ObservationModel) -> Condition:
+def derive_condition(pattern: ConstraintPattern, observation_model: ObservationModel) -> Condition:
     """The condition of a pattern: by name where it is a known one, else by the screws of all joints."""
     if pattern.motion in ("other", "oriented"):
-        return _general(observation_model)
+        return _derive_general(observation_model)
     if pattern.motion == "translations" and (fixed := [leg for leg in pattern.legs if leg.fixed]):
         what = "motion" if any(leg.turns == 0 for leg in fixed) else "translation"
-        return Named(f"never: a locked leg leaves the platform no {what}", _number(1), never=True, pattern=pattern)
+        return NamedCondition(
+            f"never: a locked leg leaves the platform no {what}", _convert_to_number(1), never=True, pattern=pattern
+        )
     lines = [leg for leg in pattern.legs if leg.line is not None]
     if pattern.motion == "translations":
-        return _translations(pattern, lines)
-    if pattern.motion == "spatial" and (form := closed_form(pattern.legs)) is not None:
+        return _derive_translations(pattern, lines)
+    if pattern.motion == "spatial" and (form := find_closed_form(pattern.legs)) is not None:
         return _name_condition(pattern, form.words, form.expression, True, parts=form.parts)
     if pattern.motion in TURNING_MOTIONS and any(
         leg.virtual and (leg.turning is not None or pattern.motion == "planar") for leg in pattern.legs
     ):
-        return _gram(pattern)
+        return _derive_gram(pattern)
     normals = [leg for leg in pattern.legs if leg.normal is not None]
     fixed = [leg for leg in pattern.legs if leg.fixed]
     if pattern.motion == "spatial" and len(normals) == len(pattern.legs) == 6:
-        return _complex(pattern, normals)
+        return _derive_line_complex(pattern, normals)
     if pattern.motion == "planar" and not pattern.flat:
-        return _gram(pattern)
+        return _derive_gram(pattern)
     if pattern.motion == "planar" and (len(lines), len(fixed)) == (1, 1):
-        return _pivot(pattern, lines[0], fixed[0])
+        return _derive_pivot(pattern, lines[0], fixed[0])
     if len(lines) == len(pattern.legs):
         if pattern.motion == "planar" and len(lines) == 3:
-            return _planar(pattern, lines)
+            return _derive_planar(pattern, lines)
         if pattern.motion == "bodies" and len(lines) == 2 and lines[0].body != lines[1].body:
-            return _bodies(pattern, lines)
-    return _gram(pattern)
+            return _derive_bodies(pattern, lines)
+    return _derive_gram(pattern)
 
 
-def _translations(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Condition:
-    dot, cross, det = products()
-    symbols = [vector(_symbol(leg.line)) for leg in lines]
-    normals = [vector(_symbol(leg.normal)) for leg in pattern.legs if leg.normal is not None]
-    names = _words_of(leg.line for leg in lines)
+def _derive_translations(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Condition:
+    dot, cross, det = load_products()
+    symbols = [make_vector(_make_symbol(leg.line)) for leg in lines]
+    normals = [make_vector(_make_symbol(leg.normal)) for leg in pattern.legs if leg.normal is not None]
+    names = _describe_features(leg.line for leg in lines)
     constant = all(pattern.constant(leg.line) is not None for leg in lines)
     signed = False
     if not lines:
         expression = sum(det(*triple) ** 2 for triple in combinations(normals, 3))
-        words = f"{_words_of(leg.normal for leg in pattern.legs)} are parallel to one plane"
+        words = f"{_describe_features(leg.normal for leg in pattern.legs)} are parallel to one plane"
         if len(normals) == 3:
             expression, signed = det(*normals), True
     elif not normals and len(lines) == 2 and pattern.plane is not None:
-        expression, signed = det(vector(_symbol(pattern.plane)), *symbols), True
+        expression, signed = det(make_vector(_make_symbol(pattern.plane)), *symbols), True
         words = f"{names} are parallel"
     elif not normals:
         expression = sum(dot(cross(a, b), cross(a, b)) for a, b in combinations(symbols, 2))
@@ -171,7 +177,7 @@ def _translations(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Con
         expression = sum(dot(cross(first, b), cross(first, b)) for b in symbols[1:])
         expression += sum(dot(first, n) ** 2 for n in normals)
         planes = [leg.normal.symbol for leg in pattern.legs if leg.normal is not None]
-        across = f"the plane{'s' * (len(planes) > 1)} normal to {_and(planes)}"
+        across = f"the plane{'s' * (len(planes) > 1)} normal to {_join_words(planes)}"
         words = (
             f"{symbols[0]} is parallel to {across}"
             if len(symbols) == 1
@@ -181,12 +187,12 @@ def _translations(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Con
         several = "all " if len(lines) > 2 else ""
         never = f"never: {names} are constant and not {several}parallel"
         return _name_condition(pattern, never, expression, False, never=True)
-    if reason := _apart(pattern):
+    if reason := _explain_no_translation(pattern):
         return _name_condition(pattern, f"never: {reason}", expression, False, never=True)
     return _name_condition(pattern, words, expression, signed)
 
 
-def _apart(pattern: ConstraintPattern) -> str | None:
+def _explain_no_translation(pattern: ConstraintPattern) -> str | None:
     """Reason why locked legs allow no common translation x at any pose, None if this is not known: x would have to lie
     along each line that is constant, and be normal to each constant axis about which a tip rotates and to each constant
     normal of a tip's plane; no x does where these rows have rank 3."""
@@ -195,61 +201,61 @@ def _apart(pattern: ConstraintPattern) -> str | None:
         line, axis = leg.line, leg.line.axis if isinstance(leg.line, Tangent) else leg.normal
         if (u := pattern.constant(line)) is not None:
             rows.append(np.eye(3) - np.outer(u, u))
-            reasons.append(f"along {_symbol(line)}")
+            reasons.append(f"along {_make_symbol(line)}")
         elif axis is not None and (n := pattern.constant(axis)) is not None:
             rows.append(n[None])
             reasons.append(f"normal to the {axis.meaning}")
-    if not rows or np.linalg.svd(np.vstack(rows), compute_uv=False)[2:].sum() <= SAME_RELATION:
+    if not rows or np.linalg.svd(np.vstack(rows), compute_uv=False)[2:].sum() <= RELATION_ANGLE_TOL:
         return None
-    return f"a translation that all locked legs allow would be {_and(reasons)}; these are constant, and there is none"
+    return f"a translation that all locked legs allow would be {_join_words(reasons)}; these are constant, and there is none"
 
 
-def _planar(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Condition:
+def _derive_planar(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Condition:
     """det of the tips' normals s_i = (n × τ_i; B_i·τ_i) as lines of the plane: s1·(s2 × s3)."""
-    dot, _, det = products()
-    n = vector(_symbol(pattern.plane))
-    tau = [vector(_symbol(leg.line)) for leg in lines]
-    tips = [vector(leg.tip.symbol) for leg in lines]
+    dot, _, det = load_products()
+    n = make_vector(_make_symbol(pattern.plane))
+    tau = [make_vector(_make_symbol(leg.line)) for leg in lines]
+    tips = [make_vector(leg.tip.symbol) for leg in lines]
     expression = sum(dot(tips[i], tau[i]) * det(n, tau[(i + 1) % 3], tau[(i + 2) % 3]) for i in range(3))
     at = ", ".join(leg.tip.symbol for leg in lines)
-    kinds = _kinds(lines, "normal to")
+    kinds = _describe_kinds(lines, "normal to")
     words = f"the lines through {at}, {kinds}, meet in a point or are parallel"
     return _name_condition(pattern, words, expression, True)
 
 
-def _pivot(pattern: ConstraintPattern, line: LockedLeg, fixed: LockedLeg) -> Condition:
+def _derive_pivot(pattern: ConstraintPattern, line: LockedLeg, fixed: LockedLeg) -> Condition:
     """One tip is fixed: the platform rotates about it where the other tip's line is the path of that rotation."""
-    dot, _, _ = products()
-    one, other, along = fixed.tip.symbol, line.tip.symbol, _symbol(line.line)
+    dot, _, _ = load_products()
+    one, other, along = fixed.tip.symbol, line.tip.symbol, _make_symbol(line.line)
     words = f"the line {one}{other} is normal to {along}"
-    return _name_condition(pattern, words, dot(vector(other) - vector(one), vector(along)), True)
+    return _name_condition(pattern, words, dot(make_vector(other) - make_vector(one), make_vector(along)), True)
 
 
-def _complex(pattern: ConstraintPattern, legs: Sequence[LockedLeg]) -> Condition:
+def _derive_line_complex(pattern: ConstraintPattern, legs: Sequence[LockedLeg]) -> Condition:
     """Six forces along lines through the tips: their Plücker coordinates are dependent."""
     import sympy
 
-    lines = [f"({_symbol(leg.normal)}, {leg.tip.symbol} x {_symbol(leg.normal)})" for leg in legs]
+    lines = [f"({_make_symbol(leg.normal)}, {leg.tip.symbol} x {_make_symbol(leg.normal)})" for leg in legs]
     words = (
         f"the lines through {', '.join(leg.tip.symbol for leg in legs)} along "
-        f"{', '.join(_symbol(leg.normal) for leg in legs)} belong to one linear complex"
+        f"{', '.join(_make_symbol(leg.normal) for leg in legs)} belong to one linear complex"
     )
     expression = sympy.Determinant(sympy.MatrixSymbol("L", 6, 6))
     return _name_condition(pattern, words, expression, True, matrices={"L": "rows " + ", ".join(lines)})
 
 
-def _bodies(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Condition:
-    _, _, det = products()
-    slide = vector(_symbol(pattern.slide))
-    expression = det(*(vector(_symbol(leg.line)) for leg in lines), slide)
+def _derive_bodies(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Condition:
+    _, _, det = load_products()
+    slide = make_vector(_make_symbol(pattern.slide))
+    expression = det(*(make_vector(_make_symbol(leg.line)) for leg in lines), slide)
     words = (
-        f"{_words_of(leg.line for leg in lines)} and the direction {slide}, in which the platform's halves move "
+        f"{_describe_features(leg.line for leg in lines)} and the direction {slide}, in which the platform's halves move "
         "on each other, are parallel to one plane"
     )
     return _name_condition(pattern, words, expression, True)
 
 
-def _gram(pattern: ConstraintPattern) -> Condition:
+def _derive_gram(pattern: ConstraintPattern) -> Condition:
     """det Σ J_iᵀ N_i J_i: more rows than dof, they must lose rank together."""
     import sympy
 
@@ -259,29 +265,29 @@ def _gram(pattern: ConstraintPattern) -> Condition:
     for leg in pattern.legs:
         label, moving = leg.tip.symbol[1:], leg.line or leg.normal
         if leg.turning is not None and pattern.motion in TURNING_MOTIONS:
-            P, name = sympy.MatrixSymbol(f"P{label}", 6, 6), _symbol(leg.turning)
+            P, name = sympy.MatrixSymbol(f"P{label}", 6, 6), _make_symbol(leg.turning)
             total += P
             across = f"I - {name} {name}^T" if leg.about is not None else f"{name} {name}^T"
             matrices.append((P.name, f"diag(0, {across})"))
-        if leg.free:
+        if leg.is_tip_free:
             continue
         J, N = sympy.MatrixSymbol(f"J{label}", 3, size), sympy.MatrixSymbol(f"N{label}", 3, 3)
         total += J.T * N * J
         slides = "[I, e]" if leg.body in pattern.bodies[1:] else "[I, 0]"
         matrices.append((J.name, slides if pattern.motion == "bodies" else f"[I, -[{leg.tip.symbol}]x]"))
-        name = "" if moving is None else _symbol(moving)
+        name = "" if moving is None else _make_symbol(moving)
         across = "I" if leg.fixed else f"I - {name} {name}^T" if leg.line is not None else f"{name} {name}^T"
         matrices.append((N.name, across))
     if pattern.motion == "planar":
         total += sympy.MatrixSymbol("P", 6, 6)
-        n = _symbol(pattern.plane)
+        n = _make_symbol(pattern.plane)
         matrices.append(("P", f"diag({n} {n}^T, I - {n} {n}^T)"))
-    moves = _moves(pattern.legs)
+    moves = _describe_motion(pattern.legs)
     if pattern.motion == "bodies":
         halves = "the platform's halves can translate, one along e relative to the other"
         words = f"{halves}, and {moves.replace('moves', 'move', 1)}"
     else:
-        words = f"some motion of the platform {moves}{_cylinders(pattern.legs)}"
+        words = f"some motion of the platform {moves}{_describe_cylinders(pattern.legs)}"
     return _name_condition(pattern, words, sympy.Determinant(total), False, matrices=dict(matrices))
 
 
@@ -294,7 +300,7 @@ def _name_condition(
     never: bool = False,
     matrices: Mapping[str, str] | None = None,
     parts: tuple[tuple[Any, str], ...] = (),
-) -> Named:
+) -> NamedCondition:
     """A condition with the meaning of its symbols and the factors that were split off."""
     import sympy
 
@@ -302,11 +308,11 @@ def _name_condition(
     used = {str(symbol) for each in (expression, *(part for part, _ in parts)) for symbol in each.free_symbols}
     used |= {leg.eye.symbol for leg in pattern.legs if leg.eye is not None}
     named = {f.symbol: f.meaning for f in pattern.features if f.symbol in used or matrices}
-    return Named(
+    return NamedCondition(
         words.replace("tau", "τ"),
         expression,
         signed,
-        tuple(_lengths(pattern.legs)),
+        tuple(_list_length_factors(pattern.legs)),
         never,
         {**(matrices or {}), **dict(sorted(named.items()))},
         parts,
@@ -314,7 +320,7 @@ def _name_condition(
     )
 
 
-def _general(observation_model: ObservationModel) -> General:
+def _derive_general(observation_model: ObservationModel) -> General:
     import sympy
 
     size = sympy.Symbol("d", integer=True, positive=True)
@@ -329,35 +335,35 @@ def _general(observation_model: ObservationModel) -> General:
     return General(words, sympy.Determinant(M.T * M), where=where, observation_model=observation_model)
 
 
-def always(pattern: ConstraintPattern, lost: str) -> str:
+def describe_permanent_loss(pattern: ConstraintPattern, lost: str) -> str:
     """Return the words for a robot with dof unobserved everywhere; ``lost`` names them."""
     text = f"always: {lost}"
     lines = [leg for leg in pattern.legs if leg.line is not None]
-    if pattern.motion == "spatial" and (names := _on_one_line(pattern.legs)):
+    if pattern.motion == "spatial" and (names := _describe_common_line(pattern.legs)):
         return f"{text}, because {names} are on one line, about which the platform can rotate"
     if pattern.motion != "planar" and len(lines) == len(pattern.legs) > 0:
         vectors = [u for leg in lines if (u := pattern.constant(leg.line)) is not None]
         if len(vectors) == len(lines) > 1 and all(
-            np.linalg.norm(np.cross(u, vectors[0])) < SAME_RELATION for u in vectors
+            np.linalg.norm(np.cross(u, vectors[0])) < RELATION_ANGLE_TOL for u in vectors
         ):
-            return f"{text}, because {_words_of(leg.line for leg in lines)} are parallel"
+            return f"{text}, because {_describe_features(leg.line for leg in lines)} are parallel"
     return text
 
 
-def _on_one_line(legs: Sequence[LockedLeg]) -> str:
+def _describe_common_line(legs: Sequence[LockedLeg]) -> str:
     """Tips, if these (two at least) are on one line in one link, and nothing else is locked; else empty."""
     if len(legs) < 2 or len({leg.tip.link for leg in legs}) > 1 or any(leg.turning is not None for leg in legs):
         return ""
     arms = np.array([leg.tip.place - legs[0].tip.place for leg in legs[1:]])
     flat = np.linalg.svd(arms, compute_uv=False)
-    return ", ".join(leg.tip.symbol for leg in legs) if flat[1:].sum() <= SAME_RELATION * flat[0] else ""
+    return ", ".join(leg.tip.symbol for leg in legs) if flat[1:].sum() <= RELATION_ANGLE_TOL * flat[0] else ""
 
 
-def _words_of(features: Iterable[NamedVector | None]) -> str:
+def _describe_features(features: Iterable[NamedVector | None]) -> str:
     """``the tangents tau1, tau2`` and the like, by what the vectors are."""
     groups: dict[str, list[str]] = {}
     for feature in features:
-        symbol = _symbol(feature)
+        symbol = _make_symbol(feature)
         groups.setdefault(_KINDS[symbol[0]], []).append(symbol)
     return " and ".join(f"the {kind} {', '.join(names)}" for kind, names in groups.items())
 
@@ -375,28 +381,31 @@ _KINDS = {
 }
 
 
-def _moves(legs: Sequence[LockedLeg]) -> str:
+def _describe_motion(legs: Sequence[LockedLeg]) -> str:
     """Motion of all tips and of the platform in words: ``moves every tip Bi along ui (i = 1, 2, 3)`` if they are
     alike."""
-    tips = [leg for leg in legs if not leg.free]
-    alike = {(leg.tip.symbol[0], _allowed_words(leg).replace(leg.tip.symbol[1:], "i")) for leg in tips}
+    tips = [leg for leg in legs if not leg.is_tip_free]
+    alike = {(leg.tip.symbol[0], _describe_allowed(leg).replace(leg.tip.symbol[1:], "i")) for leg in tips}
     parts = []
     if len(alike) > 1 or len(tips) == 1:
         still = [leg.tip.symbol for leg in tips if leg.fixed]
-        moved = [f"{leg.tip.symbol} {_allowed_words(leg)}" for leg in tips if not leg.fixed]
-        parts = [*([f"leaves {_and(still)} fixed"] if still else []), *([f"moves {_and(moved)}"] if moved else [])]
+        moved = [f"{leg.tip.symbol} {_describe_allowed(leg)}" for leg in tips if not leg.fixed]
+        parts = [
+            *([f"leaves {_join_words(still)} fixed"] if still else []),
+            *([f"moves {_join_words(moved)}"] if moved else []),
+        ]
     elif alike:
         tip, allowed = next(iter(alike))
         parts = [f"moves every tip {tip}i {allowed} (i = {', '.join(leg.tip.symbol[1:] for leg in tips)})"]
     turns = [
-        f"about {'' if leg.about is not None else 'a normal of '}{_symbol(leg.turning)}"
+        f"about {'' if leg.about is not None else 'a normal of '}{_make_symbol(leg.turning)}"
         for leg in legs
         if leg.turning is not None
     ]
-    return " and ".join([*parts, *([f"rotates it {_and(turns)}"] if turns else [])])
+    return " and ".join([*parts, *([f"rotates it {_join_words(turns)}"] if turns else [])])
 
 
-def _cylinders(legs: Sequence[LockedLeg]) -> str:
+def _describe_cylinders(legs: Sequence[LockedLeg]) -> str:
     """Return what also holds where more than three image points of one camera leave a dof unobserved."""
     rays = [leg for leg in legs if leg.eye is not None and leg.line is not None and leg.turning is None]
     eyes = {leg.eye.symbol for leg in rays if leg.eye is not None}
@@ -405,21 +414,21 @@ def _cylinders(legs: Sequence[LockedLeg]) -> str:
     return f"; {eyes.pop()} is then on the danger cylinders of all threes of points that are not on one line"
 
 
-def _allowed_words(leg: LockedLeg) -> str:
+def _describe_allowed(leg: LockedLeg) -> str:
     if leg.fixed:
         return "fixed"
-    return f"along {_symbol(leg.line)}" if leg.line is not None else f"normal to {_symbol(leg.normal)}"
+    return f"along {_make_symbol(leg.line)}" if leg.line is not None else f"normal to {_make_symbol(leg.normal)}"
 
 
-def _and(parts: Sequence[str]) -> str:
+def _join_words(parts: Sequence[str]) -> str:
     return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
 
 
-def _kinds(lines: Sequence[LockedLeg], relation: str) -> str:
-    return f"{relation} {', '.join(_symbol(leg.line) for leg in lines)}"
+def _describe_kinds(lines: Sequence[LockedLeg], relation: str) -> str:
+    return f"{relation} {', '.join(_make_symbol(leg.line) for leg in lines)}"
 
 
-def _lengths(lines: Sequence[LockedLeg]) -> list[str]:
+def _list_length_factors(lines: Sequence[LockedLeg]) -> list[str]:
     """Factors that vanish only where a crank has no length: none for unit vectors that are fixed in a link."""
     return [
         f"|{leg.line.meaning.removeprefix('tangent ')}|"
@@ -428,12 +437,12 @@ def _lengths(lines: Sequence[LockedLeg]) -> list[str]:
     ]
 
 
-def _symbol(feature: NamedVector | None) -> str:
+def _make_symbol(feature: NamedVector | None) -> str:
     assert feature is not None
     return feature.symbol
 
 
-def _number(value: int) -> Any:
+def _convert_to_number(value: int) -> Any:
     import sympy
 
     return sympy.Integer(value)

@@ -13,26 +13,26 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..geometry.ranks import range_basis
+from ..geometry.ranks import compute_range_basis
 from ..geometry.vectors import Array, cross
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.locked_twists import leg_twists_together
+from ..kinematics.locked_twists import compute_twists_at_samples
 from ..mechanism.legs import LegDecomposition
-from ..tolerances import SAME_RELATION
-from .condition import Condition, Named
+from ..tolerances import RELATION_ANGLE_TOL
+from .condition import Condition, NamedCondition
 from .locked_legs import LockedLeg
-from .named_vectors import poses_at, vanishes
+from .named_vectors import collect_poses, is_zero_everywhere
 from .pattern import ConstraintPattern
 
 
-def unexamined_poses(
+def describe_excluded_poses(
     decomposition: LegDecomposition,
     pattern: ConstraintPattern,
     condition: Condition | None,
     samples: Sequence[ClosedConfiguration],
 ) -> tuple[str, ...]:
     """Poses to which a condition does not apply, in words; none of one that the screws of all joints give."""
-    if not isinstance(condition, Named):
+    if not isinstance(condition, NamedCondition):
         return ()
     found = []
     folding = [leg.label for leg in decomposition.legs if leg.has_loops]
@@ -65,10 +65,10 @@ def may_turn(
         if any(leg.body == body and leg.turns == 0 and not leg.spins for leg in held):
             continue
         forbidden = []
-        for twists in _twists(decomposition, body, samples):
-            turns, _ = range_basis(twists[3:], 1.0)
+        for twists in _compute_leg_twists(decomposition, body, samples):
+            turns, _ = compute_range_basis(twists[3:], 1.0)
             forbidden.append(np.eye(3) - turns @ turns.T)
-        if np.linalg.svd(np.vstack(forbidden), compute_uv=False)[2] < SAME_RELATION:
+        if np.linalg.svd(np.vstack(forbidden), compute_uv=False)[2] < RELATION_ANGLE_TOL:
             return True
     return False
 
@@ -80,17 +80,19 @@ def _may_leave_the_plane(
     assert pattern.plane is not None
     if pattern.flat and any(leg.turns == 1 and not leg.virtual for leg in pattern.legs):
         return False
-    normal = pattern.plane.value(poses_at(samples[:1], pattern.plane.links))[0]
+    normal = pattern.plane.value(collect_poses(samples[:1], pattern.plane.links))[0]
     return not any(
-        vanishes(normal @ twists[:3]) and vanishes(cross(twists[3:].T, normal))
-        for twists in _twists(decomposition, pattern.bodies[0], samples)
+        is_zero_everywhere(normal @ twists[:3]) and is_zero_everywhere(cross(twists[3:].T, normal))
+        for twists in _compute_leg_twists(decomposition, pattern.bodies[0], samples)
     )
 
 
-def _twists(decomposition: LegDecomposition, body: str, samples: Sequence[ClosedConfiguration]) -> list[Array]:
+def _compute_leg_twists(
+    decomposition: LegDecomposition, body: str, samples: Sequence[ClosedConfiguration]
+) -> list[Array]:
     """Basis (6, k) of the twists that the joints of each leg on a link can give its end, over all samples."""
     return [
-        np.hstack(leg_twists_together(samples, leg, (), decomposition.mechanism.base))
+        np.hstack(compute_twists_at_samples(samples, leg, (), decomposition.mechanism.base))
         for leg in decomposition.legs
         if leg.platform_link == body
     ]

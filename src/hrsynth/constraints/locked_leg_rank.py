@@ -22,15 +22,15 @@ import numpy as np
 
 from ..geometry.vectors import Array, cross
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.locked_twists import joint_at
+from ..kinematics.locked_twists import locate_joint
 from ..mechanism import Joint, JointType, Mechanism, Observation
 from ..mechanism.composites import WordEdge, WordGraph
-from ..mechanism.graphs import adjacency, component, is_bridge, shortest_path
+from ..mechanism.graphs import build_adjacency, find_component, find_shortest_path, is_bridge
 from ..mechanism.legs import Leg
 from ..mechanism.observations.direction import Direction, SeenAxis
 from ..mechanism.observations.encoder import Encoder
-from ..tolerances import SURELY_SOMETHING
-from .named_vectors import BodyVector, poses_at, vanishes
+from ..tolerances import NONZERO_SINGULAR_VALUE_MIN
+from .named_vectors import BodyVector, collect_poses, is_zero_everywhere
 
 
 def may_gain_motion(
@@ -75,7 +75,7 @@ class _Held:
         near, far = lock.seen_from or self.reference, lock.link
         if near in self.leg.links and far not in self.leg.links:
             near, far = far, near
-        way = _way(self.mechanism, self.leg, near, far)
+        way = _find_way(self.mechanism, self.leg, near, far)
         if way is None:
             return ""
         if not way.free:
@@ -83,7 +83,7 @@ class _Held:
         left = way.without(self.joints)
         if not isinstance(lock, SeenAxis):
             return "" if all(joint.type is JointType.PRISMATIC for joint, _ in left.joints) else "tip"
-        found = _grows(self, left, lock)
+        found = _explain_gain(self, left, lock)
         turning = [joint for joint, _ in left.joints if joint.type is not JointType.PRISMATIC]
         if not found and len(turning) == 1 and turning[0].type is JointType.REVOLUTE:
             self.joints |= {turning[0].name, *left.together}
@@ -92,9 +92,9 @@ class _Held:
     def _code_of(self, joint: Joint) -> str:
         names: tuple[str, ...] = (joint.name,)
         if self.leg.has_loops and joint.name in self.leg.joints:
-            words = _contraction(self.mechanism, self.leg)
+            words = _contract_leg(self.mechanism, self.leg)
             edge = next(edge for edge in words.edges() if joint.name in edge.joints)
-            if not _bridge(words, edge):
+            if not _is_bridge(words, edge):
                 return "tip"
             names = edge.joints
         if len(joint.axes) == 1:
@@ -102,7 +102,7 @@ class _Held:
         return ""
 
 
-def _grows(held: _Held, way: _Way, lock: SeenAxis) -> str:
+def _explain_gain(held: _Held, way: _Way, lock: SeenAxis) -> str:
     mechanism, samples, tips = held.mechanism, held.samples, held.tips
     if any(joint.type is JointType.SPHERICAL for joint, _ in way.joints):
         return ""
@@ -110,44 +110,48 @@ def _grows(held: _Held, way: _Way, lock: SeenAxis) -> str:
         (np.array(centres), np.array(axes))
         for joint, link in way.joints
         if joint.type is not JointType.PRISMATIC
-        for centres, axes in _lines(joint, link, samples)
+        for centres, axes in _compute_lines(joint, link, samples)
     ]
-    if all(vanishes(cross(axes, lines[0][1])) for _, axes in lines[1:]):
+    if all(is_zero_everywhere(cross(axes, lines[0][1])) for _, axes in lines[1:]):
         return ""
     watched = BodyVector("u", "", lock.link, lock.direction)
-    u = watched.value(poses_at(samples, [lock.link]))
-    if held.translating and isinstance(lock, Direction) and _cannot_turn_back(mechanism, held.leg, lock, u, samples):
+    u = watched.value(collect_poses(samples, [lock.link]))
+    if (
+        held.translating
+        and isinstance(lock, Direction)
+        and _is_locked_in_rotation(mechanism, held.leg, lock, u, samples)
+    ):
         return ""
     (A, a), (B, b) = lines[-2:]
     if way.far is not None:  # the rod that ends in the tip in place of the parallel ones
-        near = np.array([joint_at(at, way.joints[-1][0])[0] for at in samples])
-        B = tips + near - np.array([joint_at(at, way.far)[0] for at in samples])
+        near = np.array([locate_joint(at, way.joints[-1][0])[0] for at in samples])
+        B = tips + near - np.array([locate_joint(at, way.far)[0] for at in samples])
     across = cross(a, b)
-    if vanishes(across) or not vanishes(np.sum((B - A) * across, axis=1)):
+    if is_zero_everywhere(across) or not is_zero_everywhere(np.sum((B - A) * across, axis=1)):
         return "tip"
     # the point of a next to b
     size = np.sum(across**2, axis=1, keepdims=True)
     C = A + a * (np.sum(cross(B - A, b) * across, axis=1, keepdims=True) / size)
-    return "turn" if vanishes(cross(tips - C, u)) else "tip"
+    return "turn" if is_zero_everywhere(cross(tips - C, u)) else "tip"
 
 
-def _cannot_turn_back(
+def _is_locked_in_rotation(
     mechanism: Mechanism, leg: Leg, lock: Direction, u: Array, samples: Sequence[ClosedConfiguration]
 ) -> bool:
     """Return True if the joints from the observed link to the leg's end do not rotate about u: they have one direction,
     which lies in that link as u does, and is not along u."""
-    beyond = _way(mechanism, leg, lock.link, leg.platform_link)
+    beyond = _find_way(mechanism, leg, lock.link, leg.platform_link)
     if leg.has_loops or beyond is None or any(joint.type is JointType.SPHERICAL for joint, _ in beyond.joints):
         return False
     axes = [
         np.array(each)
         for joint, link in beyond.joints
         if joint.type is not JointType.PRISMATIC
-        for _, each in _lines(joint, link, samples)
+        for _, each in _compute_lines(joint, link, samples)
     ]
     return not axes or (
-        all(vanishes(cross(each, axes[0])) for each in axes[1:])
-        and float(np.min(np.linalg.norm(cross(axes[0], u), axis=1))) > SURELY_SOMETHING
+        all(is_zero_everywhere(cross(each, axes[0])) for each in axes[1:])
+        and float(np.min(np.linalg.norm(cross(axes[0], u), axis=1))) > NONZERO_SINGULAR_VALUE_MIN
     )
 
 
@@ -170,30 +174,30 @@ class _Way:
         return _Way(left, self.far if ends else None, together=self.together if ends else ())
 
 
-def _way(mechanism: Mechanism, leg: Leg, one: str, other: str) -> _Way | None:
+def _find_way(mechanism: Mechanism, leg: Leg, one: str, other: str) -> _Way | None:
     """The way between two links; None where the leg does not hold both."""
     bonds = {frozenset(mechanism.joints[name].links): mechanism.joints[name] for name in leg.joints}
-    graph = adjacency((), bonds)
-    if one not in graph or other not in component(graph, one):
+    graph = build_adjacency((), bonds)
+    if one not in graph or other not in find_component(graph, one):
         return None
     if leg.has_loops:
         return _contract(mechanism, leg, one, other)
-    return _Way(tuple((bonds[frozenset(pair)], pair[0]) for pair in pairwise(shortest_path(graph, one, other))))
+    return _Way(tuple((bonds[frozenset(pair)], pair[0]) for pair in pairwise(find_shortest_path(graph, one, other))))
 
 
 def _contract(mechanism: Mechanism, leg: Leg, one: str, other: str) -> _Way:
     """Classify a leg with loops, not ``free`` if it passes a loop other than a parallelogram or parallel rods."""
     tied = _Way((), free=False)
-    words = _contraction(mechanism, leg)
+    words = _contract_leg(mechanism, leg)
     holder = next((edge for edge in words.edges() if other in edge.inside), None)
     graph = words.adjacency()
     if one not in graph or (holder is None and other not in graph):
         return tied
-    path = shortest_path(graph, one, other if holder is None else holder.tail)
+    path = find_shortest_path(graph, one, other if holder is None else holder.tail)
     edges = [edge for pair in pairwise(path) for _, edge in words.between(*pair)]
     if holder is not None and holder not in edges:
         edges.append(holder)
-    if any(not _bridge(words, edge) for edge in edges):
+    if any(not _is_bridge(words, edge) for edge in edges):
         return tied
     joints, at = [], one
     for edge in edges:
@@ -211,7 +215,7 @@ def _contract(mechanism: Mechanism, leg: Leg, one: str, other: str) -> _Way:
     return _Way((*joints, (near, at)), far, together=holder.joints)
 
 
-def _contraction(mechanism: Mechanism, leg: Leg) -> WordGraph:
+def _contract_leg(mechanism: Mechanism, leg: Leg) -> WordGraph:
     """A leg's joint graph, with parallelograms and equal parallel rods as edges."""
     links = {link for name in leg.joints for link in mechanism.joints[name].links}
     words = WordGraph(mechanism, {mechanism.base, leg.platform_link} & links, links)
@@ -219,15 +223,17 @@ def _contraction(mechanism: Mechanism, leg: Leg) -> WordGraph:
     return words.recognise()
 
 
-def _bridge(words: WordGraph, edge: WordEdge) -> bool:
+def _is_bridge(words: WordGraph, edge: WordEdge) -> bool:
     """Return True if only this edge joins its two sides."""
     edges = list(words.edges())
     place = next(k for k, each in enumerate(edges) if each is edge)
     return is_bridge([(each.tail, each.head) for each in edges], place)
 
 
-def _lines(joint: Joint, start: str, samples: Sequence[ClosedConfiguration]) -> list[tuple[list[Array], list[Array]]]:
+def _compute_lines(
+    joint: Joint, start: str, samples: Sequence[ClosedConfiguration]
+) -> list[tuple[list[Array], list[Array]]]:
     """Centres and directions (n, 3) of each axis of a joint, in the order from one of its links."""
-    found = [joint_at(at, joint) for at in samples]
+    found = [locate_joint(at, joint) for at in samples]
     order = range(len(joint.axes)) if start == joint.predecessor else reversed(range(len(joint.axes)))
     return [([centre for centre, _ in found], [axes[k] for _, axes in found]) for k in order]

@@ -11,15 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..geometry.ranks import range_basis
-from ..geometry.vectors import Array, frozen
+from ..geometry.ranks import compute_range_basis
+from ..geometry.vectors import Array, freeze_array
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.velocity_relation import ObservationModel
 from ..mechanism.cameras import CameraObservation
 from ..mechanism.observations.direction import SeenAxis
 from ..results import Value
-from ..tolerances import SAME_RELATION
-from .named_vectors import BodyPoint, BodyVector, CrossProduct, NamedVector, Ray, TangentNormal, poses_at
+from ..tolerances import RELATION_ANGLE_TOL
+from .named_vectors import BodyPoint, BodyVector, CrossProduct, NamedVector, Ray, TangentNormal, collect_poses
 
 Sight = CameraObservation | SeenAxis
 Place = tuple[str, tuple[float, ...]]
@@ -58,7 +58,7 @@ class LockedLeg(Value):
         return self.about or self.upright
 
     @property
-    def free(self) -> bool:
+    def is_tip_free(self) -> bool:
         """Return True if the tip may move anywhere."""
         return self.line is None and self.normal is None and not self.fixed
 
@@ -69,59 +69,59 @@ class LockedLeg(Value):
         return tuple(f for f in every if f is not None)
 
 
-def forbidden(leg: LockedLeg, values: Mapping[str, Array]) -> Array:
+def compute_forbidden_projectors(leg: LockedLeg, values: Mapping[str, Array]) -> Array:
     """N_i: the projector (n, 3, 3) on what the tip's velocity must not have."""
     if leg.line is not None:
-        return projectors(values[leg.line.symbol])
+        return compute_projectors(values[leg.line.symbol])
     if leg.normal is not None:
         n = values[leg.normal.symbol]
         return np.asarray(n[:, :, None] * n[:, None, :])
     return np.broadcast_to(np.eye(3) * leg.fixed, (len(values[leg.tip.symbol]), 3, 3))
 
 
-def stopped_turns(leg: LockedLeg, values: Mapping[str, Array]) -> Array | None:
+def compute_rotation_projectors(leg: LockedLeg, values: Mapping[str, Array]) -> Array | None:
     """The projector (n, 3, 3) on what the angular velocity must not have, None where that is nothing."""
     if leg.about is not None:
-        return projectors(values[leg.about.symbol])
+        return compute_projectors(values[leg.about.symbol])
     if leg.upright is not None:
         e = values[leg.upright.symbol]
         return np.asarray(e[:, :, None] * e[:, None, :])
     return None
 
 
-def projectors(vectors: Array) -> Array:
+def compute_projectors(vectors: Array) -> Array:
     """I − v vᵀ for unit vectors (n, 3)."""
     projector: Array = np.eye(3) - vectors[:, :, None] * vectors[:, None, :]
     return projector
 
 
-def virtual_legs(
+def build_virtual_legs(
     seen: Sequence[Sight], reference: str, bodies: Sequence[str], first: int, samples: Sequence[ClosedConfiguration]
 ) -> tuple[LockedLeg, ...] | None:
     """The virtual legs of observations of a body of the platform, numbered from ``first``; None where one has wrenches
     that have no name, or that are not those of its rates everywhere."""
-    found, eyes = [], _eyes(seen, reference, samples[0].model.length)
+    found, eyes = [], _list_camera_centres(seen, reference, samples[0].model.length)
     for number, each in enumerate(seen, first):
-        leg = _virtual_leg(each, reference, bodies, str(number), eyes, samples)
+        leg = _build_virtual_leg(each, reference, bodies, str(number), eyes, samples)
         if leg is None:
             return None
         found.append(leg)
     return tuple(found)
 
 
-def sights(observation_model: ObservationModel, base: str, bodies: Sequence[str]) -> tuple[Sight, ...]:
+def list_observations(observation_model: ObservationModel, base: str, bodies: Sequence[str]) -> tuple[Sight, ...]:
     """The observations between the base and a body of the platform, without the directions that legs have."""
     return tuple(
         o
         for o in observation_model.observations
         if isinstance(o, CameraObservation | SeenAxis)
-        and not o.by_segment
+        and not o.is_segment_direction
         and (ends := {o.link, o.seen_from or observation_model.reference}) & set(bodies)
         and base in ends
     )
 
 
-def _eyes(seen: Sequence[Sight], reference: str, length: float) -> dict[Place, BodyPoint]:
+def _list_camera_centres(seen: Sequence[Sight], reference: str, length: float) -> dict[Place, BodyPoint]:
     """The centres of all cameras, each once: C, or C1, C2 and so on."""
     found: dict[Place, str] = {}
     for o in seen:
@@ -133,7 +133,7 @@ def _eyes(seen: Sequence[Sight], reference: str, length: float) -> dict[Place, B
             "C" if len(found) == 1 else f"C{n}",
             f"{words}, fixed in {key[0]}",
             key[0],
-            frozen(np.array(key[1]) / length),
+            freeze_array(np.array(key[1]) / length),
         )
         for n, (key, words) in enumerate(found.items(), 1)
     }
@@ -143,7 +143,7 @@ def _place(seen: CameraObservation, reference: str) -> Place:
     return seen.seen_from or reference, tuple(seen.view[:3, 3].tolist())
 
 
-def _virtual_leg(
+def _build_virtual_leg(
     seen: Sight,
     camera: str,
     bodies: Sequence[str],
@@ -160,18 +160,18 @@ def _virtual_leg(
         eye, place = eyes[_place(seen, camera)], seen.at / length
     else:
         eye, place = None, np.zeros(3)
-    tip = BodyPoint(f"B{symbol}", f"point of {seen.leg} on {link}", link, frozen(place))
+    tip = BodyPoint(f"B{symbol}", f"point of {seen.leg} on {link}", link, freeze_array(place))
     forces, moments = [], []
     for at in samples:
         sighting = seen.sighting(at.pose(reference), at.pose(link))
         wrenches = np.array(seen.wrenches(sighting), dtype=float)
         couples = np.linalg.norm(wrenches[:, :3], axis=1) == 0
-        forces.append(range_basis(wrenches[~couples, :3].T, 1.0)[0])
-        moments.append(range_basis(wrenches[couples, 3:].T, 1.0)[0])
+        forces.append(compute_range_basis(wrenches[~couples, :3].T, 1.0)[0])
+        moments.append(compute_range_basis(wrenches[couples, 3:].T, 1.0)[0])
     if len({(F.shape[1], M.shape[1]) for F, M in zip(forces, moments, strict=True)}) != 1:
         return None
-    candidates = _candidates(seen, symbol, link, reference, tip, eye, length)
-    places = poses_at(samples, [name for each in candidates for name in each.links])
+    candidates = _list_candidates(seen, symbol, link, reference, tip, eye, length)
+    places = collect_poses(samples, [name for each in candidates for name in each.links])
 
     def named(normals: Sequence[Array]) -> NamedVector | None:
         """The vector along these (n of (3, 1)), or normal to these (n of (3, 2))."""
@@ -180,7 +180,7 @@ def _virtual_leg(
             (
                 each
                 for each in candidates
-                if np.max(np.linalg.norm(np.cross(each.value(places), along), axis=1)) < SAME_RELATION
+                if np.max(np.linalg.norm(np.cross(each.value(places), along), axis=1)) < RELATION_ANGLE_TOL
             ),
             None,
         )
@@ -205,7 +205,7 @@ def _virtual_leg(
     )
 
 
-def _candidates(
+def _list_candidates(
     seen: Sight, symbol: str, link: str, reference: str, tip: BodyPoint, eye: BodyPoint | None, length: float
 ) -> list[NamedVector]:
     """The ray to the point, the axis, the camera's z axis, the normal n of the plane of both first, and axis × n."""
@@ -215,7 +215,10 @@ def _candidates(
         found += [
             Ray(f"r{symbol}", f"ray from {eye.symbol} to {tip.symbol}", eye, tip),
             BodyVector(
-                f"z{symbol}", f"z axis of {eye.meaning.removeprefix('centre of ')}", reference, frozen(seen.view[:3, 2])
+                f"z{symbol}",
+                f"z axis of {eye.meaning.removeprefix('centre of ')}",
+                reference,
+                freeze_array(seen.view[:3, 2]),
             ),
         ]
     if axis is not None:

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..geometry.vectors import Array, frozen, inverse
+from ..geometry.vectors import Array, freeze_array, invert_pose
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism import Joint, Mechanism
-from ..mechanism.observations.edge import tangent
+from ..mechanism.observations.edge import compute_edge_tangent
 from ..results import Value
-from ..tolerances import SAME_RELATION
+from ..tolerances import RELATION_ANGLE_TOL
 
 Poses = Mapping[str, Array]
 
@@ -83,7 +83,7 @@ class Tangent(NamedVector):
         return (*self.axis.links, *self.start.links, *self.end.links)
 
     def value(self, poses: Poses) -> Array:
-        return unit_rows(np.cross(self.axis.value(poses), self.end.value(poses) - self.start.value(poses)))
+        return normalise_rows(np.cross(self.axis.value(poses), self.end.value(poses) - self.start.value(poses)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -98,7 +98,7 @@ class Segment(NamedVector):
         return (*self.start.links, *self.end.links)
 
     def value(self, poses: Poses) -> Array:
-        return unit_rows(self.end.value(poses) - self.start.value(poses))
+        return normalise_rows(self.end.value(poses) - self.start.value(poses))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -119,7 +119,7 @@ class CrossProduct(NamedVector):
         return (*self.one.links, *self.other.links)
 
     def value(self, poses: Poses) -> Array:
-        return unit_rows(np.cross(self.one.value(poses), self.other.value(poses)))
+        return normalise_rows(np.cross(self.one.value(poses), self.other.value(poses)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -138,30 +138,30 @@ class TangentNormal(NamedVector):
 
     def value(self, poses: Poses) -> Array:
         out = self.on_axis.value(poses) - self.start.value(poses)
-        return tangent(out, self.axis.value(poses), np.array([self.radius]))
+        return compute_edge_tangent(out, self.axis.value(poses), np.array([self.radius]))
 
 
-def unit_rows(vectors: Array) -> Array:
+def normalise_rows(vectors: Array) -> Array:
     """Vectors (..., 3) divided by their lengths; a zero vector stays zero."""
     size = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.asarray(vectors / np.where(size > 0, size, 1.0))
 
 
-def axis_of(mechanism: Mechanism, joint: Joint, symbol: str, which: int = 0) -> BodyVector:
+def make_axis(mechanism: Mechanism, joint: Joint, symbol: str, which: int = 0) -> BodyVector:
     """The (first or second) axis of a joint, as fixed in the link that carries it."""
     link = joint.links[which]
     direction = mechanism.links[link].pose[:3, :3].T @ joint.axes[which]
     words = f"axis of {joint.name}" if len(joint.axes) == 1 else f"{('first', 'second')[which]} axis of {joint.name}"
-    return BodyVector(symbol, words, link, frozen(direction))
+    return BodyVector(symbol, words, link, freeze_array(direction))
 
 
-def centre_of(mechanism: Mechanism, joint: Joint, link: str, symbol: str, length: float) -> BodyPoint:
+def make_centre(mechanism: Mechanism, joint: Joint, link: str, symbol: str, length: float) -> BodyPoint:
     """The centre of a joint, as fixed in one of its links."""
-    place = inverse(mechanism.links[link].pose) @ np.append(joint.point, 1.0)
-    return BodyPoint(symbol, f"centre of {joint.name}", link, frozen(place[:3] / length))
+    place = invert_pose(mechanism.links[link].pose) @ np.append(joint.point, 1.0)
+    return BodyPoint(symbol, f"centre of {joint.name}", link, freeze_array(place[:3] / length))
 
 
-def poses_at(configurations: Sequence[ClosedConfiguration], links: Sequence[str]) -> dict[str, Array]:
+def collect_poses(configurations: Sequence[ClosedConfiguration], links: Sequence[str]) -> dict[str, Array]:
     """Poses (n, 4, 4) of links at several configurations, positions in characteristic lengths."""
     names = tuple(dict.fromkeys(links))
     X = np.array([at.model.poses(at.q, names) for at in configurations])
@@ -169,6 +169,6 @@ def poses_at(configurations: Sequence[ClosedConfiguration], links: Sequence[str]
     return {name: X[:, i] for i, name in enumerate(names)}
 
 
-def vanishes(block: Array) -> bool:
+def is_zero_everywhere(block: Array) -> bool:
     """Return True if vectors, of any shape, are zero at all configurations."""
-    return bool(np.max(np.abs(block), initial=0.0) < SAME_RELATION)
+    return bool(np.max(np.abs(block), initial=0.0) < RELATION_ANGLE_TOL)

@@ -13,20 +13,36 @@ from itertools import combinations
 
 import numpy as np
 
-from ..budgets import LEGS_HELD
-from ..geometry.ranks import range_basis
-from ..geometry.vectors import Array, cross, frozen, hat
+from ..budgets import CACHED_LOCKED_LEGS_COUNT
+from ..geometry.ranks import compute_range_basis
+from ..geometry.vectors import Array, cross, freeze_array, hat
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.locked_twists import leg_twists_together, split_together
-from ..kinematics.velocity_relation import ObservationModel, relation
+from ..kinematics.locked_twists import compute_twists_at_samples, split_together
+from ..kinematics.velocity_relation import ObservationModel, compute_relation
 from ..mechanism import JointType, Mechanism, Observation
 from ..mechanism.legs import Leg, LegDecomposition
 from ..mechanism.observations.direction import Direction
 from ..results import Value
-from ..tolerances import SAME_RELATION
+from ..tolerances import RELATION_ANGLE_TOL
 from .locked_leg_rank import may_gain_motion
-from .locked_legs import LockedLeg, forbidden, sights, stopped_turns, virtual_legs
-from .named_vectors import BodyPoint, BodyVector, NamedVector, Segment, Tangent, axis_of, centre_of, poses_at, vanishes
+from .locked_legs import (
+    LockedLeg,
+    build_virtual_legs,
+    compute_forbidden_projectors,
+    compute_rotation_projectors,
+    list_observations,
+)
+from .named_vectors import (
+    BodyPoint,
+    BodyVector,
+    NamedVector,
+    Segment,
+    Tangent,
+    collect_poses,
+    is_zero_everywhere,
+    make_axis,
+    make_centre,
+)
 
 TURNING_MOTIONS = ("planar", "spatial")
 """Motions of a platform of which turns are a part."""
@@ -82,7 +98,7 @@ class PatternValues(Value):
     @cached_property
     def _poses(self) -> dict[str, Array]:
         links = [link for feature in self.pattern.features for link in feature.links]
-        return poses_at(self.configurations, [*links, *self.pattern.bodies])
+        return collect_poses(self.configurations, [*links, *self.pattern.bodies])
 
     @cached_property
     def values(self) -> dict[str, Array]:
@@ -98,9 +114,13 @@ class PatternValues(Value):
         """Constraints of a locked leg on the platform links, (n, rows, 6 bodies), on the twists of their frames'
         origins: the tip's velocity across V_i, and the rotation where it allows none."""
         arms = leg.tip.value(self._poses) - self._poses[leg.body][:, :3, 3]
-        across = forbidden(leg, self.values)
+        across = compute_forbidden_projectors(leg, self.values)
         blocks = np.concatenate([across, -across @ hat(arms)], axis=2)
-        turns = np.broadcast_to(np.eye(3), (len(arms), 3, 3)) if leg.turns == 0 else stopped_turns(leg, self.values)
+        turns = (
+            np.broadcast_to(np.eye(3), (len(arms), 3, 3))
+            if leg.turns == 0
+            else compute_rotation_projectors(leg, self.values)
+        )
         if turns is not None:
             blocks = np.concatenate([blocks, np.concatenate([np.zeros_like(turns), turns], axis=2)], axis=1)
         bodies = self.pattern.bodies
@@ -110,18 +130,18 @@ class PatternValues(Value):
         return found
 
 
-def leg_ends(decomposition: LegDecomposition) -> tuple[str, ...]:
+def list_leg_ends(decomposition: LegDecomposition) -> tuple[str, ...]:
     """The links of the platform on which legs end."""
     return tuple(dict.fromkeys(leg.platform_link for leg in decomposition.legs))
 
 
-def placing_links(decomposition: LegDecomposition) -> tuple[str, ...]:
+def list_placing_links(decomposition: LegDecomposition) -> tuple[str, ...]:
     """Links that define the platform pose: those on which legs end, and the controlled one where these allow several
     poses."""
     return (
-        leg_ends(decomposition)
-        if decomposition.decided
-        else (*leg_ends(decomposition), decomposition.mechanism.platform)
+        list_leg_ends(decomposition)
+        if decomposition.is_platform_decided
+        else (*list_leg_ends(decomposition), decomposition.mechanism.platform)
     )
 
 
@@ -134,20 +154,20 @@ def recognise(
 ) -> ConstraintPattern:
     """The pattern at the samples; ``motion`` is ``other`` where it is none of the known ones, or, unless it need not
     hold ``everywhere``, where a locked leg may allow its end more at special poses."""
-    other = ConstraintPattern("other", decomposition.mechanism.base, leg_ends(decomposition))
-    base, bodies = decomposition.mechanism.base, leg_ends(decomposition)
-    motions = _motions(decomposition, observation_model, samples)
-    by_platform = sights(observation_model, base, bodies)
+    other = ConstraintPattern("other", decomposition.mechanism.base, list_leg_ends(decomposition))
+    base, bodies = decomposition.mechanism.base, list_leg_ends(decomposition)
+    motions = _compute_motions(decomposition, observation_model, samples)
+    by_platform = list_observations(observation_model, base, bodies)
     locks: dict[str, list[Observation]] = {leg.label: [] for leg in decomposition.legs}
     for each in observation_model.observations:
         if each not in by_platform:
-            leg = _leg_of(each, decomposition, observation_model)
+            leg = _find_leg(each, decomposition, observation_model)
             if leg is None:
                 return other
             locks[leg].append(each)
-    translating = len(bodies) == 1 and vanishes(motions[:, 3:])
+    translating = len(bodies) == 1 and is_zero_everywhere(motions[:, 3:])
     held = {
-        leg.label: _locked_leg(
+        leg.label: _build_locked_leg(
             decomposition,
             leg,
             tuple(locks[leg.label]),
@@ -161,7 +181,9 @@ def recognise(
     alone = motions.shape[1:] == (6, 6) and not any(locks.values())
     if decomposition.mechanism.couplings and not alone:
         return other
-    virtual = virtual_legs(by_platform, observation_model.reference, bodies, 1 if alone else len(held) + 1, samples)
+    virtual = build_virtual_legs(
+        by_platform, observation_model.reference, bodies, 1 if alone else len(held) + 1, samples
+    )
     seen = [leg for label, leg in held.items() if locks[label]]
     if virtual is None or None in seen or not (seen or virtual):
         return other
@@ -169,21 +191,21 @@ def recognise(
     every = None if None in held.values() else (*(leg for leg in held.values() if leg is not None), *virtual)
     other = replace(other, legs=legs)
     if decomposition.point is not None:
-        velocities = [relation(at, observation_model.of_platform).twists for at in samples]
-        found: ConstraintPattern | None = _translations(decomposition, every, legs, velocities, samples)
+        velocities = [compute_relation(at, observation_model.of_platform).twists for at in samples]
+        found: ConstraintPattern | None = _match_translations(decomposition, every, legs, velocities, samples)
     elif len(other.bodies) == 1:
-        found = _one_body(decomposition, every, legs, motions, samples)
+        found = _match_one_body(decomposition, every, legs, motions, samples)
     else:
-        found = _two_bodies(decomposition, legs, motions, samples)
+        found = _match_two_bodies(decomposition, legs, motions, samples)
     if (
         found is not None
         and found.plane is not None
         and found.motion == "planar"
         and not all(
-            _turns_about(
+            _can_rotate_about(
                 found.plane,
                 own,
-                leg_twists_together(samples, leg, locks[leg.label], observation_model.reference),
+                compute_twists_at_samples(samples, leg, locks[leg.label], observation_model.reference),
                 samples,
             )
             for leg in decomposition.legs
@@ -198,7 +220,7 @@ def recognise(
         else tuple(
             leg
             for leg in found.legs
-            if not leg.free
+            if not leg.is_tip_free
             or (found.motion in TURNING_MOTIONS and leg.turning is not None)
             or (found.motion == "oriented" and leg.turns < 3)
         )
@@ -206,29 +228,29 @@ def recognise(
     return replace(found, legs=binding) if found is not None and binding else other
 
 
-def _turns_about(
+def _can_rotate_about(
     normal: NamedVector, leg: LockedLeg, systems: Sequence[Array], samples: Sequence[ClosedConfiguration]
 ) -> bool:
     """Return True if a locked leg, which allows these twists (6, k), lets its end rotate about the normal through its
     tip."""
-    poses = poses_at(samples, [*normal.links, *leg.tip.links])
+    poses = collect_poses(samples, [*normal.links, *leg.tip.links])
     n, B = normal.value(poses), leg.tip.value(poses)
     turns = np.hstack([cross(B, n), n])
-    return all(vanishes(t - T @ (T.T @ t)) for t, T in zip(turns, systems, strict=True))
+    return all(is_zero_everywhere(t - T @ (T.T @ t)) for t, T in zip(turns, systems, strict=True))
 
 
-def _leg_of(seen: Observation, decomposition: LegDecomposition, observation_model: ObservationModel) -> str | None:
+def _find_leg(seen: Observation, decomposition: LegDecomposition, observation_model: ObservationModel) -> str | None:
     """The label of the leg of which an observation is: that it bears, or of the one in which it lies."""
     if seen.leg in decomposition.labels:
         return seen.leg
     inside = {seen.link, seen.seen_from or observation_model.reference} - {
         decomposition.mechanism.base,
-        *leg_ends(decomposition),
+        *list_leg_ends(decomposition),
     }
     return next((leg.label for leg in decomposition.legs if inside and inside <= set(leg.links)), None)
 
 
-def _one_body(
+def _match_one_body(
     decomposition: LegDecomposition,
     every: tuple[LockedLeg, ...] | None,
     legs: tuple[LockedLeg, ...],
@@ -237,26 +259,28 @@ def _one_body(
 ) -> ConstraintPattern | None:
     """Return the pattern of one platform link: of the observed ``legs``, or of ``every`` leg; None where one has
     none."""
-    base, bodies = decomposition.mechanism.base, leg_ends(decomposition)
+    base, bodies = decomposition.mechanism.base, list_leg_ends(decomposition)
     own = [leg for leg in legs if not leg.virtual]
     if len(own) < len(decomposition.legs) and motions.shape[2] < (2 if own else 3):  # the other legs hold as well
         return None
-    if vanishes(motions[:, 3:]):
-        return _translations(decomposition, every, legs, list(motions[:, :3]), samples)
+    if is_zero_everywhere(motions[:, 3:]):
+        return _match_translations(decomposition, every, legs, list(motions[:, :3]), samples)
     if any(leg.turns == 0 and not leg.spins for leg in legs):
-        return None if every is None else replace(_translating(decomposition, every, samples), turning=True)
+        return None if every is None else replace(_build_translating(decomposition, every, samples), turning=True)
     if any(leg.turns < 3 and leg.spins for leg in legs):
         return None
-    normal = _plane_of(motions)
+    normal = _find_plane_normal(motions)
     if normal is not None and all(leg.line is not None or leg.virtual for leg in legs):
         flat = all(
-            vanishes(leg.line.value(poses_at(samples, leg.line.links)) @ normal) for leg in legs if leg.line is not None
+            is_zero_everywhere(leg.line.value(collect_poses(samples, leg.line.links)) @ normal)
+            for leg in legs
+            if leg.line is not None
         )
         return ConstraintPattern(
-            "planar", base, bodies, legs, plane=_normal(decomposition.mechanism, normal), flat=flat
+            "planar", base, bodies, legs, plane=_make_normal(decomposition.mechanism, normal), flat=flat
         )
     if every is not None and all(leg.turns == 1 and leg.normal is None and not leg.virtual for leg in every):
-        plane = _common_plane(decomposition.mechanism, every, samples)
+        plane = _find_common_plane(decomposition.mechanism, every, samples)
         return None if plane is None else ConstraintPattern("planar", base, bodies, every, plane=plane)
     if motions.shape[2] == 6 and all(leg.turns == 3 or leg.virtual for leg in legs):
         return ConstraintPattern("spatial", base, bodies, legs)
@@ -266,7 +290,7 @@ def _one_body(
     return None
 
 
-def _translations(
+def _match_translations(
     decomposition: LegDecomposition,
     every: tuple[LockedLeg, ...] | None,
     legs: tuple[LockedLeg, ...],
@@ -275,99 +299,114 @@ def _translations(
 ) -> ConstraintPattern | None:
     """Return the pattern of translations with the bases (3, d): of the observed ``legs`` if these allow the tips only
     such, else of ``every`` leg, since the others constrain as well; None where one of them has none."""
-    if len(motions) == len(samples) and all(_within(leg, motions, samples) for leg in legs):
-        return _translating(decomposition, legs, samples)
-    return None if every is None else _translating(decomposition, every, samples)
+    if len(motions) == len(samples) and all(_is_confined_to(leg, motions, samples) for leg in legs):
+        return _build_translating(decomposition, legs, samples)
+    return None if every is None else _build_translating(decomposition, every, samples)
 
 
-def _within(leg: LockedLeg, motions: Sequence[Array], samples: Sequence[ClosedConfiguration]) -> bool:
+def _is_confined_to(leg: LockedLeg, motions: Sequence[Array], samples: Sequence[ClosedConfiguration]) -> bool:
     """Return True if a leg lets its tip move in these directions (3, d) alone, at all samples."""
-    poses = poses_at(samples, [link for feature in leg.features for link in feature.links])
-    across = forbidden(leg, {feature.symbol: feature.value(poses) for feature in leg.features})
-    return all(vanishes((np.eye(3) - F @ F.T) @ (np.eye(3) - N)) for F, N in zip(motions, across, strict=True))
+    poses = collect_poses(samples, [link for feature in leg.features for link in feature.links])
+    across = compute_forbidden_projectors(leg, {feature.symbol: feature.value(poses) for feature in leg.features})
+    return all(
+        is_zero_everywhere((np.eye(3) - F @ F.T) @ (np.eye(3) - N)) for F, N in zip(motions, across, strict=True)
+    )
 
 
-def _translating(
+def _build_translating(
     decomposition: LegDecomposition, legs: tuple[LockedLeg, ...], samples: Sequence[ClosedConfiguration]
 ) -> ConstraintPattern:
     lines = [leg.line for leg in legs if leg.line is not None]
     plane = None
-    if lines and len(lines) == sum(not leg.free for leg in legs):
-        poses = poses_at(samples, [link for line in lines for link in line.links])
+    if lines and len(lines) == sum(not leg.is_tip_free for leg in legs):
+        poses = collect_poses(samples, [link for line in lines for link in line.links])
         _, s, Vt = np.linalg.svd(np.concatenate([line.value(poses) for line in lines]))
-        if s[1] > SAME_RELATION * s[0] > s[2]:
-            plane = _normal(decomposition.mechanism, Vt[2], "direction normal to the lines along which the tips move")
-    found = ConstraintPattern("translations", decomposition.mechanism.base, leg_ends(decomposition), legs, plane=plane)
+        if s[1] > RELATION_ANGLE_TOL * s[0] > s[2]:
+            plane = _make_normal(
+                decomposition.mechanism, Vt[2], "direction normal to the lines along which the tips move"
+            )
+    found = ConstraintPattern(
+        "translations", decomposition.mechanism.base, list_leg_ends(decomposition), legs, plane=plane
+    )
     turns = {
         link: X[:, :3, :3]
-        for link, X in poses_at(samples, [link for each in found.features for link in each.links]).items()
+        for link, X in collect_poses(samples, [link for each in found.features for link in each.links]).items()
     }
-    return replace(found, steady={link: frozen(R[0]) for link, R in turns.items() if vanishes(R - R[0])})
+    return replace(
+        found, steady={link: freeze_array(R[0]) for link, R in turns.items() if is_zero_everywhere(R - R[0])}
+    )
 
 
-def _two_bodies(
+def _match_two_bodies(
     decomposition: LegDecomposition, legs: tuple[LockedLeg, ...], motions: Array, samples: Sequence[ClosedConfiguration]
 ) -> ConstraintPattern | None:
     """Pattern of two links that only translate, the second along one direction relative to the first. The controlled
     link must be fixed with them, which fails if it is joined by loops with dead points."""
-    bodies = leg_ends(decomposition)
+    bodies = list_leg_ends(decomposition)
     still = motions[:, [3, 4, 5, 9, 10, 11]]
-    if not decomposition.decided or len(bodies) != 2 or motions.shape[2] != 4 or not vanishes(still):
+    if (
+        not decomposition.is_platform_decided
+        or len(bodies) != 2
+        or motions.shape[2] != 4
+        or not is_zero_everywhere(still)
+    ):
         return None
-    relative = [range_basis(F[6:9] - F[:3], 1.0)[0] for F in motions]
+    relative = [compute_range_basis(F[6:9] - F[:3], 1.0)[0] for F in motions]
     if any(each.shape[1] != 1 for each in relative):
         return None
     directions = np.array([each[:, 0] for each in relative])
     inner = [j for j in decomposition.mechanism.joints.values() if set(j.links) <= set(decomposition.platform)]
     named = [
-        *(axis_of(decomposition.mechanism, j, "e") for j in inner if j.type is JointType.PRISMATIC),
-        *_tangents(decomposition, [j.name for j in inner], "e"),
+        *(make_axis(decomposition.mechanism, j, "e") for j in inner if j.type is JointType.PRISMATIC),
+        *_list_tangents(decomposition, [j.name for j in inner], "e"),
     ]
-    slide = next((f for f in named if _along(f, directions, samples)), None)
+    slide = next((f for f in named if _is_parallel_feature(f, directions, samples)), None)
     if slide is None:
         return None
-    return ConstraintPattern("bodies", decomposition.mechanism.base, leg_ends(decomposition), legs, slide=slide)
+    return ConstraintPattern("bodies", decomposition.mechanism.base, list_leg_ends(decomposition), legs, slide=slide)
 
 
-def _motions(
+def _compute_motions(
     decomposition: LegDecomposition, observation_model: ObservationModel, samples: Sequence[ClosedConfiguration]
 ) -> Array:
     """Bases (n, 6 bodies, d) of the motions of the platform links with nothing locked; they differ in number where the
     samples are not alike, then the largest are kept."""
-    asked = replace(observation_model, bodies=leg_ends(decomposition), observations=())
-    found = [relation(at, asked).basis[asked.twist_rows :] for at in samples]
-    bases = [range_basis(each, 1.0)[0] for each in found]
+    asked = replace(observation_model, bodies=list_leg_ends(decomposition), observations=())
+    found = [compute_relation(at, asked).basis[asked.twist_rows :] for at in samples]
+    bases = [compute_range_basis(each, 1.0)[0] for each in found]
     most = max(basis.shape[1] for basis in bases)
     return np.array([basis for basis in bases if basis.shape[1] == most])
 
 
-def moving(
+def describe_platform_motion(
     decomposition: LegDecomposition, observation_model: ObservationModel, samples: Sequence[ClosedConfiguration]
 ) -> tuple[str, Array | None]:
     """Motion of a platform of one link with nothing locked: ``translations``, ``planar`` with the normal, or
     ``spatial``."""
-    motions = _motions(decomposition, observation_model, samples)
-    if vanishes(motions[:, 3:]):
+    motions = _compute_motions(decomposition, observation_model, samples)
+    if is_zero_everywhere(motions[:, 3:]):
         return "translations", None
-    normal = _plane_of(motions)
+    normal = _find_plane_normal(motions)
     return ("spatial", None) if normal is None else ("planar", normal)
 
 
-def _common_plane(
+def _find_common_plane(
     mechanism: Mechanism, legs: Sequence[LockedLeg], samples: Sequence[ClosedConfiguration]
 ) -> NamedVector | None:
     """The constant direction about which all legs turn and across which all tips move."""
     joints = [j for j in mechanism.joints.values() if j.type is JointType.REVOLUTE]
-    axes = [axis_of(mechanism, joint, "n") for joint in joints]
-    values = np.concatenate([axis.value(poses_at(samples, axis.links)) for axis in axes])
+    axes = [make_axis(mechanism, joint, "n") for joint in joints]
+    values = np.concatenate([axis.value(collect_poses(samples, axis.links)) for axis in axes])
     lines = [leg.line for leg in legs if leg.line is not None]
-    paths = [line.value(poses_at(samples, line.links)) for line in lines]
-    if not vanishes(cross(values, values[0])) or any(not vanishes(path @ values[0]) for path in paths):
+    paths = [line.value(collect_poses(samples, line.links)) for line in lines]
+    if not is_zero_everywhere(cross(values, values[0])) or any(
+        not is_zero_everywhere(path @ values[0]) for path in paths
+    ):
         return None
-    return _normal(mechanism, values[0])
+    return _make_normal(mechanism, values[0])
 
 
-def _plane_of(motions: Array) -> Array | None:
+def _find_plane_normal(motions: Array) -> Array | None:
     """The constant normal of planar motions (n, 6, 3): two translations normal to it, one rotation about it."""
     if motions.shape[2] != 3:
         return None
@@ -375,18 +414,18 @@ def _plane_of(motions: Array) -> Array | None:
     _, s, Vt = np.linalg.svd(turns)
     normal: Array = Vt[0]
     flat = max(float(np.max(np.abs(normal @ F[:3]))) for F in motions)
-    return normal if s[1] < SAME_RELATION and flat < SAME_RELATION else None
+    return normal if s[1] < RELATION_ANGLE_TOL and flat < RELATION_ANGLE_TOL else None
 
 
-def _normal(mechanism: Mechanism, normal: Array, meaning: str = "normal of the plane of motion") -> BodyVector:
+def _make_normal(mechanism: Mechanism, normal: Array, meaning: str = "normal of the plane of motion") -> BodyVector:
     """A constant direction, of the sense in which its largest component is positive."""
     sense = np.sign(normal[np.argmax(np.abs(normal))])
     direction = mechanism.links[mechanism.base].pose[:3, :3].T @ (normal * sense)
-    return BodyVector("n", meaning, mechanism.base, frozen(direction))
+    return BodyVector("n", meaning, mechanism.base, freeze_array(direction))
 
 
-@lru_cache(maxsize=LEGS_HELD)
-def _locked_leg(
+@lru_cache(maxsize=CACHED_LOCKED_LEGS_COUNT)
+def _build_locked_leg(
     decomposition: LegDecomposition,
     leg: Leg,
     locks: tuple[Observation, ...],
@@ -397,12 +436,12 @@ def _locked_leg(
 ) -> LockedLeg | None:
     """Pattern of the leg with these observations locked, alike at all samples (``everywhere``: all poses), or None."""
     try:
-        systems = leg_twists_together(samples, leg, locks, reference)
+        systems = compute_twists_at_samples(samples, leg, locks, reference)
     except ValueError:
         return None
     symbol = leg.label if leg.label.isalnum() else str(decomposition.labels.index(leg.label) + 1)
-    for spot in _tips(decomposition, leg, symbol, samples[0].model.length):
-        points = spot.value(poses_at(samples, spot.links))
+    for spot in _list_tips(decomposition, leg, symbol, samples[0].model.length):
+        points = spot.value(collect_poses(samples, spot.links))
         parts = split_together(systems, list(points))
         first = parts[0]
         shape = (first.translations.shape[1], first.rotations.shape[1])
@@ -435,18 +474,20 @@ def _locked_leg(
     return None
 
 
-def _tips(decomposition: LegDecomposition, leg: Leg, symbol: str, length: float) -> Iterator[BodyPoint]:
+def _list_tips(decomposition: LegDecomposition, leg: Leg, symbol: str, length: float) -> Iterator[BodyPoint]:
     """Points at which the leg may come apart: its joints on the platform first, then the others, inwards."""
     mechanism = decomposition.mechanism
     joints = [mechanism.joints[name] for name in leg.joints]
     if decomposition.point is not None:
-        yield BodyPoint(f"B{symbol}", "the platform's point", mechanism.platform, frozen(decomposition.point / length))
+        yield BodyPoint(
+            f"B{symbol}", "the platform's point", mechanism.platform, freeze_array(decomposition.point / length)
+        )
     for joint in joints:
         if leg.platform_link in joint.links:
-            yield centre_of(mechanism, joint, leg.platform_link, f"B{symbol}", length)
+            yield make_centre(mechanism, joint, leg.platform_link, f"B{symbol}", length)
     for joint in reversed(joints):
         if leg.platform_link not in joint.links:
-            yield centre_of(mechanism, joint, joint.predecessor, f"A{symbol}", length)
+            yield make_centre(mechanism, joint, joint.predecessor, f"A{symbol}", length)
 
 
 def _name_vector(
@@ -468,16 +509,19 @@ def _name_vector(
                 )
             )
     joints = [mechanism.joints[name] for name in leg.joints]
-    candidates += [axis_of(mechanism, j, f"p{symbol}") for j in joints if j.type.slides]
-    candidates += _segments(decomposition, leg.joints, f"r{symbol}")
-    candidates += _tangents(decomposition, leg.joints, f"tau{symbol}")
+    candidates += [make_axis(mechanism, j, f"p{symbol}") for j in joints if j.type.has_translation]
+    candidates += _list_segments(decomposition, leg.joints, f"r{symbol}")
+    candidates += _list_tangents(decomposition, leg.joints, f"tau{symbol}")
     candidates += [
-        axis_of(mechanism, j, f"a{symbol}", which) for j in joints if not j.type.slides for which in range(len(j.axes))
+        make_axis(mechanism, j, f"a{symbol}", which)
+        for j in joints
+        if not j.type.has_translation
+        for which in range(len(j.axes))
     ]
-    return next((f for f in candidates if _along(f, values, samples)), None)
+    return next((f for f in candidates if _is_parallel_feature(f, values, samples)), None)
 
 
-def _tangents(decomposition: LegDecomposition, names: Sequence[str], symbol: str) -> Iterator[Tangent]:
+def _list_tangents(decomposition: LegDecomposition, names: Sequence[str], symbol: str) -> Iterator[Tangent]:
     """Tangents of the paths of joint centres about R axes, for some joints; those on one link first."""
     mechanism, length = decomposition.mechanism, decomposition.mechanism.length
     joints = [mechanism.joints[name] for name in names]
@@ -495,13 +539,13 @@ def _tangents(decomposition: LegDecomposition, names: Sequence[str], symbol: str
         yield Tangent(
             symbol,
             f"tangent {axis.name} × ({end.name} − {axis.name})",
-            axis_of(mechanism, axis, "a", which),
-            centre_of(mechanism, axis, axis.links[which], "P", length),
-            centre_of(mechanism, end, link, "Q", length),
+            make_axis(mechanism, axis, "a", which),
+            make_centre(mechanism, axis, axis.links[which], "P", length),
+            make_centre(mechanism, end, link, "Q", length),
         )
 
 
-def _segments(decomposition: LegDecomposition, names: Sequence[str], symbol: str) -> Iterator[Segment]:
+def _list_segments(decomposition: LegDecomposition, names: Sequence[str], symbol: str) -> Iterator[Segment]:
     """Directions from joint centre to joint centre of the links of a leg."""
     mechanism, length = decomposition.mechanism, decomposition.mechanism.length
     joints = [mechanism.joints[name] for name in names]
@@ -510,14 +554,14 @@ def _segments(decomposition: LegDecomposition, names: Sequence[str], symbol: str
             yield Segment(
                 symbol,
                 f"direction from {one.name} to {two.name}",
-                centre_of(mechanism, one, link, "P", length),
-                centre_of(mechanism, two, link, "Q", length),
+                make_centre(mechanism, one, link, "P", length),
+                make_centre(mechanism, two, link, "Q", length),
             )
 
 
-def _along(feature: NamedVector, values: Array, samples: Sequence[ClosedConfiguration]) -> bool:
+def _is_parallel_feature(feature: NamedVector, values: Array, samples: Sequence[ClosedConfiguration]) -> bool:
     """Return True if a feature is parallel to vectors (n, 3) at all samples."""
-    found = feature.value(poses_at(samples, feature.links))
-    if np.min(np.linalg.norm(found, axis=1)) < SAME_RELATION:
+    found = feature.value(collect_poses(samples, feature.links))
+    if np.min(np.linalg.norm(found, axis=1)) < RELATION_ANGLE_TOL:
         return False
-    return bool(np.max(np.linalg.norm(cross(found, values), axis=1)) < SAME_RELATION)
+    return bool(np.max(np.linalg.norm(cross(found, values), axis=1)) < RELATION_ANGLE_TOL)

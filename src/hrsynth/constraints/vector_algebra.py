@@ -24,7 +24,7 @@ class Products(NamedTuple):
 
 
 @cache
-def products() -> Products:
+def load_products() -> Products:
     """``dot`` (symmetric), ``cross`` and ``det`` (a·(b × c)), with the signs of permutations taken out."""
     import sympy
 
@@ -59,10 +59,10 @@ def __getattr__(name: str) -> Any:
     """Return the products that a pickled expression names."""
     if name not in Products._fields:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(products(), name)
+    return getattr(load_products(), name)
 
 
-def vector(name: str) -> Any:
+def make_vector(name: str) -> Any:
     """A symbol that stands for a vector."""
     import sympy
 

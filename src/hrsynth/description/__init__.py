@@ -14,7 +14,7 @@ from importlib import resources
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from ..budgets import LARGEST_FILE
+from ..budgets import ROBOT_FILE_MAX_BYTES
 from ..errors import (
     AssumedBase,
     AssumedPlatform,
@@ -29,25 +29,25 @@ from ..results import with_spelling
 from . import formats
 from .example_data import PREFIX, list_examples
 from .file_format import FileFormat
-from .files import as_path, require_same, require_writable, write_whole
+from .files import convert_to_path, require_same, require_writable, write_whole
 from .formats import native
 from .meshes import carry_meshes, remove_written, write_meshes
 from .overrides import Overrides
 from .reading import read
-from .tree import spanning
+from .tree import build_spanning_mechanism
 
 if TYPE_CHECKING:
     from yourdfpy import URDF
 
-__all__ = ["list_examples", "list_robots", "load", "native", "save", "spanning", "targets"]
+__all__ = ["build_spanning_mechanism", "list_examples", "list_robots", "list_save_targets", "load", "native", "save"]
 
 NAMED = "a path, the name of a shipped robot, example:NAME"
 """Ways to give a robot's file."""
 LOADED = f"{NAMED}, an open file, XML text, a yourdfpy.URDF"
 """Objects that are read."""
-MOST_TOLD = 60
+ERROR_INPUT_CHARACTERS_MAX = 60
 """Letters of a given value that a message shows."""
-MOST_WARNED = 400
+WARNING_CHARACTERS_MAX = 400
 """Letters of a warning."""
 GIVEN, NOWHERE = "the given text", "(nowhere, as no file is given)"
 """Name of a given text in errors, and of the folder of the files that it names."""
@@ -122,7 +122,7 @@ def load(
         For an unknown name, with the closest names, and if an option is missing.
     BadRobotFile
         For defects of the file, all of them with their lines.
-    LoopsNotClosed, RankUndecided, StructureUndecided
+    LoopClosureFailure, UndecidedRank, UndecidedStructure
         For loops that stay open, and for rounded numbers that leave the rank of the loops or the structure undecided.
 
     Warns
@@ -150,7 +150,7 @@ def load(
         as_written=as_written,
     )
     if isinstance(robot, Mechanism):
-        if overrides.any or tolerance is not None or base is not None or observe is not None:
+        if overrides.has_any or tolerance is not None or base is not None or observe is not None:
             raise BadRequest(
                 "--base, --platform and the other file overrides need a file: this robot is already read",
                 robot.name,
@@ -158,15 +158,17 @@ def load(
             )
         return robot
     if isinstance(robot, os.PathLike) or (isinstance(robot, str) and "<" not in robot):
-        found = read(file_of(robot), overrides)
+        found = read(find_robot_file(robot), overrides)
     else:
         found = _read_content(robot, overrides)
     for note in found.notes:
         if note.base:
-            warn_caller(shorten_text(f"{found.name}: {note.text}", MOST_WARNED), AssumedBase)
+            warn_caller(shorten_text(f"{found.name}: {note.text}", WARNING_CHARACTERS_MAX), AssumedBase)
     if found.choice is not None and found.choice.chosen == "assumption":
         text = f"{found.name}: the platform is link {found.platform!r}, {found.choice}"
-        warn_caller(shorten_text(f"{text} (platform={found.platform!r} confirms it)", MOST_WARNED), AssumedPlatform)
+        warn_caller(
+            shorten_text(f"{text} (platform={found.platform!r} confirms it)", WARNING_CHARACTERS_MAX), AssumedPlatform
+        )
     return found
 
 
@@ -178,9 +180,11 @@ def _read_content(robot: Any, overrides: Overrides) -> Mechanism:
         data: Any = robot
     elif callable(getattr(robot, "read", None)):
         try:
-            data = robot.read(LARGEST_FILE + 1)
+            data = robot.read(ROBOT_FILE_MAX_BYTES + 1)
         except (OSError, ValueError):
-            raise BadRequest("the open file cannot be read", _short(robot), "a file that is open for reading") from None
+            raise BadRequest(
+                "the open file cannot be read", _shorten_value(robot), "a file that is open for reading"
+            ) from None
     elif type(robot).__module__.partition(".")[0] == "yourdfpy" and hasattr(robot, "write_xml_string"):
         data, name = robot.write_xml_string(), ""
         looked_in = getattr(getattr(robot, "_filename_handler", None), "keywords", {}).get("dir")
@@ -189,9 +193,9 @@ def _read_content(robot: Any, overrides: Overrides) -> Mechanism:
     decoded = isinstance(data, str)
     data = data.encode(errors="replace") if decoded else data
     if not isinstance(data, bytes):
-        raise BadRequest("a robot's file", _short(robot), LOADED)
+        raise BadRequest("a robot's file", _shorten_value(robot), LOADED)
     with contextlib.suppress(OSError):
-        if os.path.isfile(name) and _lines(Path(name).read_bytes()) == _lines(data):
+        if os.path.isfile(name) and _split_lines(Path(name).read_bytes()) == _split_lines(data):
             return read(Path(name), overrides)
     if decoded:  # whatever encoding it declares
         data = re.sub(rb"""^(\s*<\?xml[^>]*?)\s+encoding=("[^"]*"|'[^']*')""", rb"\1", data)
@@ -202,7 +206,12 @@ def _read_content(robot: Any, overrides: Overrides) -> Mechanism:
         def said(text: str) -> str:
             whole = text.replace(str(file), GIVEN).replace(folder, NOWHERE)
             return shorten_text(
-                re.sub(rf"\S{{{MOST_TOLD},}}", lambda word: shorten_text(word[0], MOST_TOLD), whole), 300
+                re.sub(
+                    rf"\S{{{ERROR_INPUT_CHARACTERS_MAX},}}",
+                    lambda word: shorten_text(word[0], ERROR_INPUT_CHARACTERS_MAX),
+                    whole,
+                ),
+                300,
             )
 
         try:
@@ -218,23 +227,27 @@ def _read_content(robot: Any, overrides: Overrides) -> Mechanism:
     return replace(found, file=str(Path(looked_in) / f"{found.name}.urdf") if looked_in else None, sha256=None)
 
 
-def _lines(data: bytes) -> list[bytes]:
+def _split_lines(data: bytes) -> list[bytes]:
     """Return the lines of a file without line ends and byte order mark, which text that is read has lost."""
     return data.removeprefix(BOM_UTF8).splitlines()
 
 
-def _short(value: object) -> object:
+def _shorten_value(value: object) -> object:
     """Return a value as a message shows it: whole if it is short."""
-    return value if len(repr(value)) <= MOST_TOLD else shorten_text(str(value), MOST_TOLD - 2)
+    return (
+        value
+        if len(repr(value)) <= ERROR_INPUT_CHARACTERS_MAX
+        else shorten_text(str(value), ERROR_INPUT_CHARACTERS_MAX - 2)
+    )
 
 
-def file_of(robot: str | os.PathLike[str]) -> Path:
+def find_robot_file(robot: str | os.PathLike[str]) -> Path:
     """Return the file of a name or path. Raises ``BadRequest`` for an unknown robot."""
     if not isinstance(robot, str | os.PathLike) or robot == "" or (isinstance(robot, str) and {"\n", "<"} & {*robot}):
-        raise BadRequest("a robot's file", _short(robot), NAMED)
+        raise BadRequest("a robot's file", _shorten_value(robot), NAMED)
     path = Path(robot)
     if isinstance(robot, str) and robot.startswith(PREFIX) and not os.path.exists(robot):
-        return _file_by_name(
+        return _find_named_file(
             robot.removeprefix(PREFIX), list_examples(), "not a robot of example-robot-data", "robots --examples"
         )
     if isinstance(robot, str) and not path.suffix and len(path.parts) == 1:
@@ -243,22 +256,24 @@ def file_of(robot: str | os.PathLike[str]) -> Path:
             if path.is_file():
                 return path
         if robot in robots or not os.path.exists(robot):
-            return _file_by_name(robot, robots, "neither a file nor a shipped robot", "robots")
+            return _find_named_file(robot, robots, "neither a file nor a shipped robot", "robots")
     return path
 
 
-def _file_by_name(name: str, files: dict[str, Path], what: str, command: str) -> Path:
+def _find_named_file(name: str, files: dict[str, Path], what: str, command: str) -> Path:
     """Return the file of a robot by its name. Raises ``BadRequest`` with the closest names."""
     if name in files:
         return files[name]
     close = difflib.get_close_matches(name, files, n=5) or list(files)
-    raise BadRequest(what, _short(name), f"a file or one of `hrsynth {command}`, such as " + ", ".join(close[:12]))
+    raise BadRequest(
+        what, _shorten_value(name), f"a file or one of `hrsynth {command}`, such as " + ", ".join(close[:12])
+    )
 
 
-def targets(path: str | Path, format: str | None = None) -> tuple[Path, ...]:
+def list_save_targets(path: str | Path, format: str | None = None) -> tuple[Path, ...]:
     """Return the files that :func:`save` writes, the tree first. Raises ``BadRequest`` for an unknown format or
     extension, and for files that cannot be written."""
-    files = _dialect(Path(path), format).files(Path(path))
+    files = _choose_format(Path(path), format).files(Path(path))
     for file in files:
         require_writable(file)
     return files
@@ -305,12 +320,12 @@ def save(
 
     if meshes not in ("keep", "copy"):
         raise BadRequest("meshes", meshes, ("keep", "copy"))
-    target = as_path(path)
-    chosen, mechanism = _dialect(target, format), load(mechanism)
+    target = convert_to_path(path)
+    chosen, mechanism = _choose_format(target, format), load(mechanism)
     robot, copies, notes = carry_meshes(mechanism, target, chosen.meshes, copy=meshes == "copy")
     new = write_meshes(copies)
     try:
-        found = formats.writer(chosen.name)(robot)
+        found = formats.get_writer(chosen.name)(robot)
         texts = zip(chosen.files(target), found.texts, strict=True)
         contents = {file: chosen.packed(text, file) for file, text in texts}
         for file, content in contents.items():
@@ -327,7 +342,7 @@ def save(
 
 def _require_whole(file: Path, others: Iterable[Path]) -> None:
     """Raise ``BadRequest`` if a file to be replaced is read together with one that stays."""
-    partners = [each.partner(file) for each in formats.dialects().values() if os.path.isfile(file)]
+    partners = [each.partner(file) for each in formats.list_formats().values() if os.path.isfile(file)]
     written = set(map(os.path.realpath, others))
     for partner in filter(None, partners):
         if os.path.realpath(partner) not in written:
@@ -338,8 +353,8 @@ def _require_whole(file: Path, others: Iterable[Path]) -> None:
             )
 
 
-def _dialect(target: Path, name: str | None) -> FileFormat:
-    dialects = formats.writable()
+def _choose_format(target: Path, name: str | None) -> FileFormat:
+    dialects = formats.list_writable_formats()
     endings = {ending: each.name for each in dialects for ending in each.endings}
     if name is None and target.suffix.lower() not in endings:
         raise BadRequest(

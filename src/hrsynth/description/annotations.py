@@ -10,15 +10,15 @@ from urllib.parse import quote, unquote
 import numpy as np
 
 from ..errors import BadRequest
-from ..geometry.vectors import frozen, inverse
+from ..geometry.vectors import freeze_array, invert_pose
 from ..mechanism.cameras import NamedCamera
 from ..mechanism.model import JointType, Mechanism, Motor
 from ..mechanism.observations.direction import Direction
-from ..tolerances import WITHOUT_DIRECTION
+from ..tolerances import VECTOR_LENGTH_MIN
 from . import numerals
 from .elements import TURNS
 from .jointgraph import FrameSpec, JointGraph
-from .observation_text import attributes_of, spec_of
+from .observation_text import list_observe_attributes, parse_observe_attributes
 
 NAMESPACE = "urn:hrsynth"
 PREFIX = "hrsynth"
@@ -38,10 +38,11 @@ def drop_world(graph: JointGraph) -> JointGraph:
     del graph.joints[weld.name], graph.links[world]
     here = weld.links.index(world)
     graph.base = weld.links[1 - here]
-    X_BW = weld.ends[1 - here].X @ inverse(weld.ends[here].X)
+    X_BW = weld.ends[1 - here].X @ invert_pose(weld.ends[here].X)
     for joint in floating:
         one, two = (
-            FrameSpec(graph.base, frozen(X_BW @ end.X), end.line) if end.link == world else end for end in joint.ends
+            FrameSpec(graph.base, freeze_array(X_BW @ end.X), end.line) if end.link == world else end
+            for end in joint.ends
         )
         graph.joints[joint.name] = replace(joint, ends=(one, two))
     return graph
@@ -68,16 +69,16 @@ def read_annotation(graph: JointGraph, key: str, text: str) -> str | None:
             direction = numerals.parse(" ".join(words[2:]), 3)
         except ValueError as error:
             return str(error)
-        if not np.linalg.norm(direction) > WITHOUT_DIRECTION:
+        if not np.linalg.norm(direction) > VECTOR_LENGTH_MIN:
             return "observe: a zero direction"
         graph.observations.append(Direction(words[0], words[1], direction))
     elif key in ("see", "eye"):
         said = {name: value for name, _, value in (word.partition("=") for word in words)}
         try:
             if key == "see":
-                graph.sights.append(spec_of(said))
+                graph.sights.append(parse_observe_attributes(said))
             else:
-                graph.cameras.append(_camera(said))
+                graph.cameras.append(_parse_camera(said))
         except (BadRequest, KeyError, ValueError) as error:
             return str(error)
     else:
@@ -85,16 +86,16 @@ def read_annotation(graph: JointGraph, key: str, text: str) -> str | None:
     return None
 
 
-def _camera(said: dict[str, str]) -> NamedCamera:
+def _parse_camera(said: dict[str, str]) -> NamedCamera:
     place, turn = (numerals.parse(said.get(key, "0 0 0"), 3) for key in ("xyz", "rpy"))
     size = [float(numerals.parse(said[key], 1)[0]) if key in said else None for key in IMAGE]
     width, height = (None if each is None else int(each) for each in size[1:])
-    return NamedCamera(said["name"], said["link"], numerals.from_origin(place, turn), size[0], width, height)
+    return NamedCamera(said["name"], said["link"], numerals.compute_origin_pose(place, turn), size[0], width, height)
 
 
-def annotations_of(robot: Mechanism, *, motors: bool = False) -> Iterable[tuple[str, str]]:
+def list_annotations(robot: Mechanism, *, motors: bool = False) -> Iterable[tuple[str, str]]:
     """Yield key and text of all annotations of a robot, in order."""
-    if not robot.open_platform:
+    if not robot.has_open_platform:
         yield "formation" if robot.formation else "platform", quote(robot.platform)
     if robot.turns is not None:
         yield "turns", str(robot.turns).lower()
@@ -104,18 +105,18 @@ def annotations_of(robot: Mechanism, *, motors: bool = False) -> Iterable[tuple[
         if motors and joint.motor is not None:
             yield "motor", f"{quote(joint.motor.name)} {quote(joint.name)}"
     for camera in robot.cameras:
-        yield "eye", _write_attributes(camera_attributes(camera, numerals.ANGLE_DECIMALS))
+        yield "eye", _write_attributes(list_camera_attributes(camera, numerals.ANGLE_DECIMALS_COUNT))
     for each in robot.observations:
-        if isinstance(each, Direction) and each.by_segment:
-            yield "observe", f"{quote(each.leg)} {quote(each.link)} {numerals.axis(each.direction)}"
+        if isinstance(each, Direction) and each.is_segment_direction:
+            yield "observe", f"{quote(each.leg)} {quote(each.link)} {numerals.format_axis(each.direction)}"
         else:
-            yield "see", _write_attributes(attributes_of(each, robot, numerals.ANGLE_DECIMALS))
+            yield "see", _write_attributes(list_observe_attributes(each, robot, numerals.ANGLE_DECIMALS_COUNT))
 
 
-def camera_attributes(camera: NamedCamera, decimals: int) -> dict[str, str]:
+def list_camera_attributes(camera: NamedCamera, decimals: int) -> dict[str, str]:
     """Return the attributes of a camera by name."""
-    image = {key: numerals.exact(value) for key in IMAGE if (value := getattr(camera, key)) is not None}
-    return {"name": camera.name, "link": camera.link, **numerals.origin(camera.pose, decimals)[1], **image}
+    image = {key: numerals.format_exact(value) for key in IMAGE if (value := getattr(camera, key)) is not None}
+    return {"name": camera.name, "link": camera.link, **numerals.format_origin(camera.pose, decimals)[1], **image}
 
 
 def _write_attributes(attributes: dict[str, str]) -> str:

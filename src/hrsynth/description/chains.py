@@ -23,7 +23,7 @@ import numpy as np
 from ..errors import BadRequest
 from ..geometry.vectors import Array
 from ..mechanism.model import Joint, JointType, Link, Mechanism, Motor
-from ..tolerances import SAME_DIRECTION, SAME_POINT
+from ..tolerances import DIRECTION_SINE_TOL, POINT_DISTANCE_TOL
 
 TIP = "__tip"
 BODY = "__body"
@@ -37,15 +37,15 @@ _FIRST = re.compile(r"(?P<name>.+)__1", re.DOTALL)
 _R, _P = JointType.REVOLUTE, JointType.PRISMATIC
 
 
-def part(name: str, number: int) -> str:
+def name_chain_joint(name: str, number: int) -> str:
     """Return the name of the ``number``-th joint (and, with BODY, of the link that it carries) of the chain of
     ``name``."""
     return f"{name}__{number}"
 
 
-def part_names(name: str, count: int) -> list[str]:
+def list_chain_joints(name: str, count: int) -> list[str]:
     """Return the names of the joints that a joint (or its motors) is written as: its name if it is one."""
-    return [name] if count <= 1 else [part(name, number + 1) for number in range(count)]
+    return [name] if count <= 1 else [name_chain_joint(name, number + 1) for number in range(count)]
 
 
 def require_free(name: str, joint: Joint, *taken: Container[str]) -> None:
@@ -96,15 +96,15 @@ def merge(mechanism: Mechanism) -> Mechanism:
     gone: set[str] = set()
     for match in [match for name in joints if (match := _FIRST.fullmatch(name))]:
         name = match["name"]
-        chain = [joints[each] for number in (1, 2, 3) if (each := part(name, number)) in joints]
+        chain = [joints[each] for number in (1, 2, 3) if (each := name_chain_joint(name, number)) in joints]
         if (
             name in joints
             or len(chain) < 2
-            or [joint.name for joint in chain] != [part(name, number + 1) for number in range(len(chain))]
+            or [joint.name for joint in chain] != [name_chain_joint(name, number + 1) for number in range(len(chain))]
         ):
             continue
         between = [links.get(joint.successor) for joint in chain[:-1]]
-        whole = _whole(name, chain, between, mechanism.length) if all(map(bare, between)) else None
+        whole = _recognise_chain(name, chain, between, mechanism.length) if all(map(bare, between)) else None
         if whole is not None:
             for joint in chain[:-1]:
                 del links[joint.successor]
@@ -114,18 +114,18 @@ def merge(mechanism: Mechanism) -> Mechanism:
     return replace(mechanism, links=links, joints={joint.name: joint for joint in kept})
 
 
-def _whole(name: str, chain: list[Joint], between: list[Link | None], length: float) -> Joint | None:
+def _recognise_chain(name: str, chain: list[Joint], between: list[Link | None], length: float) -> Joint | None:
     """Return the joint that a chain forms, or None if its links, geometry, motors or limits do not fit."""
     first = chain[0]
     for number, (before, after) in enumerate(pairwise(chain), 1):
-        own = part(name, number)
+        own = name_chain_joint(name, number)
         if before.successor != after.predecessor or before.successor not in (own, own + BODY):
             return None
     if any(
         not joint.in_tree
-        or np.linalg.norm(joint.point - first.point) > SAME_POINT * length
+        or np.linalg.norm(joint.point - first.point) > POINT_DISTANCE_TOL * length
         or joint.limits != first.limits
-        or joint.actuated != first.actuated
+        or joint.is_actuated != first.is_actuated
         or (joint.xml and joint is not first)
         for joint in chain
     ):
@@ -137,14 +137,14 @@ def _whole(name: str, chain: list[Joint], between: list[Link | None], length: fl
     match kind:
         case JointType.SPHERICAL:
             frame = None if between[0] is None else between[0].pose[:3, :3]
-            same = frame is not None and np.max(np.abs(np.array(axes).T - frame)) <= SAME_DIRECTION
+            same = frame is not None and np.max(np.abs(np.array(axes).T - frame)) <= DIRECTION_SINE_TOL
             axes = []
         case JointType.CYLINDRICAL:
-            same = np.linalg.norm(axes[0] - axes[1]) <= SAME_DIRECTION
+            same = np.linalg.norm(axes[0] - axes[1]) <= DIRECTION_SINE_TOL
             axes = axes[1:]
         case _:
             gram = np.array([[a @ b for a in axes] for b in axes])
-            same = np.max(np.abs(gram - np.eye(len(axes)))) <= SAME_DIRECTION
+            same = np.max(np.abs(gram - np.eye(len(axes)))) <= DIRECTION_SINE_TOL
             axes = axes if kind is JointType.UNIVERSAL else axes[2:]
     if not same:
         return None
@@ -154,23 +154,23 @@ def _whole(name: str, chain: list[Joint], between: list[Link | None], length: fl
         type=kind,
         successor=chain[-1].successor,
         axes=tuple(axes),
-        motor=_motor(chain),
-        offset=_offset(kind, chain),
+        motor=_merge_motors(chain),
+        offset=_find_offset(kind, chain),
     )
 
 
-def _offset(kind: JointType, chain: list[Joint]) -> Array | None:
+def _find_offset(kind: JointType, chain: list[Joint]) -> Array | None:
     """Return the offset from which the file counts the whole joint; not kept for spherical and planar joints."""
     if kind not in (JointType.UNIVERSAL, JointType.CYLINDRICAL) or all(joint.offset is None for joint in chain):
         return None
     return np.concatenate([np.zeros(1) if joint.offset is None else joint.offset for joint in chain])
 
 
-def _motor(chain: list[Joint]) -> Motor | None:
+def _merge_motors(chain: list[Joint]) -> Motor | None:
     motors = [joint.motor for joint in chain if joint.motor is not None]
     if not motors:
         return None
     stem = motors[0].name.removesuffix("__1")
-    same = [motor.name for motor in motors] == [part(stem, number + 1) for number in range(len(motors))]
+    same = [motor.name for motor in motors] == [name_chain_joint(stem, number + 1) for number in range(len(motors))]
     fragments = list(dict.fromkeys(motor.xml for motor in motors if motor.xml is not None))
     return Motor(stem if same else motors[0].name, "".join(fragments) or None)

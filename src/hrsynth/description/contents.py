@@ -1,7 +1,7 @@
 """Masses, inertias and shapes of links, carried from one format to another.
 
 A mechanism keeps them as the child elements of URDF's ``<link>``; other formats are read into these elements and
-written from what :func:`content_of` returns. Metres, kilograms, radians; all poses are in the link's frame.
+written from what :func:`collect_content` returns. Metres, kilograms, radians; all poses are in the link's frame.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..geometry.vectors import Array, frozen, unit
+from ..geometry.vectors import Array, freeze_array, normalise_vector
 from ..mechanism.model import Link, Mechanism, Note
 from . import numerals, xml
-from .jointgraph import ORIGIN, comma_list
+from .jointgraph import ORIGIN, join_names
 
 SIZES = {
     "box": ("size",),
@@ -60,7 +60,7 @@ class Content:
     rest: tuple[str, ...] = ()
 
 
-def scaled_shapes(link: Link, factor: float) -> Link:
+def scale_shapes(link: Link, factor: float) -> Link:
     """Return the link with the lengths of its shapes and of its centre of mass scaled; attributes that are not numbers
     stay."""
     found = []
@@ -77,12 +77,12 @@ def scaled_shapes(link: Link, factor: float) -> Link:
                 except ValueError:
                     continue
                 if words:
-                    each.set(key, numerals.exact_vector(values))
-        found.append(xml.canonical(element))
+                    each.set(key, numerals.format_exact_vector(values))
+        found.append(xml.format_canonical(element))
     return replace(link, xml=tuple(found))
 
 
-def content_of(link: Link, robot: Mechanism) -> Content:
+def collect_content(link: Link, robot: Mechanism) -> Content:
     """Return the content of a link; a colour may be named by a ``<material>`` of the robot."""
     if not link.xml:
         return Content()
@@ -90,7 +90,7 @@ def content_of(link: Link, robot: Mechanism) -> Content:
         name: colour
         for fragment in robot.xml
         if fragment.startswith("<material")
-        for name, colour in [_material(xml.parse_fragment(fragment), {})]
+        for name, colour in [_parse_material(xml.parse_fragment(fragment), {})]
         if name and colour
     }
     inertial, solids, rest = None, [], []
@@ -100,9 +100,9 @@ def content_of(link: Link, robot: Mechanism) -> Content:
             if element is None:
                 rest.append(fragment)
             elif element.tag == "inertial" and inertial is None:
-                inertial = _inertial(element)
+                inertial = _parse_inertial(element)
             elif element.tag in SHAPES:
-                solids.append(_solid(element, colours))
+                solids.append(_parse_solid(element, colours))
             else:
                 rest.append(fragment)
         except ValueError:
@@ -110,26 +110,28 @@ def content_of(link: Link, robot: Mechanism) -> Content:
     return Content(inertial, tuple(solids), tuple(rest))
 
 
-def _numbers(element: xml.Element | None, name: str, default: tuple[float, ...]) -> Array:
+def _parse_numbers(element: xml.Element | None, name: str, default: tuple[float, ...]) -> Array:
     text = None if element is None else element.get(name)
     return np.array(default, dtype=float) if text is None else numerals.parse(text, len(default))
 
 
-def _pose(element: xml.Element) -> Array:
+def _parse_pose(element: xml.Element) -> Array:
     origin = element.find("origin")
-    return frozen(numerals.from_origin(_numbers(origin, "xyz", (0, 0, 0)), _numbers(origin, "rpy", (0, 0, 0))))
+    return freeze_array(
+        numerals.compute_origin_pose(_parse_numbers(origin, "xyz", (0, 0, 0)), _parse_numbers(origin, "rpy", (0, 0, 0)))
+    )
 
 
-def _inertial(element: xml.Element) -> Inertial:
-    (mass,) = _numbers(element.find("mass"), "value", (0,))
+def _parse_inertial(element: xml.Element) -> Inertial:
+    (mass,) = _parse_numbers(element.find("mass"), "value", (0,))
     tensor = element.find("inertia")
     if tensor is None:
-        return Inertial(float(mass), _pose(element))
-    xx, yy, zz, xy, xz, yz = (float(_numbers(tensor, key, (0,))[0]) for key in INERTIA)
-    return Inertial(float(mass), _pose(element), frozen([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+        return Inertial(float(mass), _parse_pose(element))
+    xx, yy, zz, xy, xz, yz = (float(_parse_numbers(tensor, key, (0,))[0]) for key in INERTIA)
+    return Inertial(float(mass), _parse_pose(element), freeze_array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
 
 
-def _material(
+def _parse_material(
     element: xml.Element | None, known: Mapping[str, tuple[float, ...]]
 ) -> tuple[str, tuple[float, ...] | None]:
     if element is None:
@@ -137,69 +139,75 @@ def _material(
     name, colour = element.get("name", ""), element.find("color")
     if colour is None:
         return name, known.get(name)
-    return name, tuple(float(v) for v in _numbers(colour, "rgba", (1, 1, 1, 1)))
+    return name, tuple(float(v) for v in _parse_numbers(colour, "rgba", (1, 1, 1, 1)))
 
 
-def _solid(element: xml.Element, colours: Mapping[str, tuple[float, ...]]) -> Solid:
-    shapes = [child for each in element.findall("geometry") for child in xml.children(each) if child.tag in SIZES]
+def _parse_solid(element: xml.Element, colours: Mapping[str, tuple[float, ...]]) -> Solid:
+    shapes = [child for each in element.findall("geometry") for child in xml.list_children(each) if child.tag in SIZES]
     if len(shapes) != 1:
         raise ValueError("one shape")
     (shape,) = shapes
-    kind, place, role = str(shape.tag), _pose(element), str(element.tag)
-    colour = _material(element.find("material"), colours)[1]
+    kind, place, role = str(shape.tag), _parse_pose(element), str(element.tag)
+    colour = _parse_material(element.find("material"), colours)[1]
     if kind == "mesh":
-        scale = tuple(float(v) for v in _numbers(shape, "scale", (1, 1, 1)))
+        scale = tuple(float(v) for v in _parse_numbers(shape, "scale", (1, 1, 1)))
         if not shape.get("filename"):
             raise ValueError("the file of a mesh")
         return Solid(kind, (), place, role, element.get("name"), colour, shape.get("filename"), scale)
     count = 3 if kind == "box" else 1
-    sizes = tuple(float(v) for key in SIZES[kind] for v in _numbers(shape, key, (0,) * count))
+    sizes = tuple(float(v) for key in SIZES[kind] for v in _parse_numbers(shape, key, (0,) * count))
     if not all(size > 0 for size in sizes):
         raise ValueError("sizes above 0")
     return Solid(kind, sizes, place, role, element.get("name"), colour)
 
 
-def fragments(content: Content) -> tuple[str, ...]:
+def write_fragments(content: Content) -> tuple[str, ...]:
     """Return the content as child elements of URDF's ``<link>``, each as text."""
     found = []
     if content.inertial is not None:
         mass, tensor = content.inertial.mass, content.inertial.inertia
-        element = xml.new("inertial", *_origin(content.inertial.X), xml.new("mass", value=numerals.exact(mass)))
+        element = xml.create_element(
+            "inertial",
+            *_write_origin(content.inertial.X),
+            xml.create_element("mass", value=numerals.format_exact(mass)),
+        )
         if tensor is not None:
             entries = zip(INERTIA, (*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2]), strict=True)
-            element.append(xml.new("inertia", **{key: numerals.exact(value) for key, value in entries}))
-        found.append(xml.canonical(element))
+            element.append(
+                xml.create_element("inertia", **{key: numerals.format_exact(value) for key, value in entries})
+            )
+        found.append(xml.format_canonical(element))
     for solid in content.solids:
         if solid.file is not None:
-            shape = xml.new("mesh", filename=solid.file)
+            shape = xml.create_element("mesh", filename=solid.file)
             if solid.scale != (1.0, 1.0, 1.0):
-                shape.set("scale", numerals.exact_vector(solid.scale))
+                shape.set("scale", numerals.format_exact_vector(solid.scale))
         elif solid.kind == "box":
-            shape = xml.new("box", size=numerals.exact_vector(solid.sizes))
+            shape = xml.create_element("box", size=numerals.format_exact_vector(solid.sizes))
         else:
             sizes = zip(SIZES[solid.kind], solid.sizes, strict=True)
-            shape = xml.new(solid.kind, **{key: numerals.exact(value) for key, value in sizes})
-        element = xml.new(solid.role, *_origin(solid.X), xml.new("geometry", shape))
+            shape = xml.create_element(solid.kind, **{key: numerals.format_exact(value) for key, value in sizes})
+        element = xml.create_element(solid.role, *_write_origin(solid.X), xml.create_element("geometry", shape))
         if solid.name:
             element.set("name", solid.name)
         if solid.colour is not None and solid.role == "visual":
-            colour = xml.new("color", rgba=numerals.exact_vector(solid.colour))
-            element.append(xml.new("material", colour, name=""))
-        found.append(xml.canonical(element))
+            colour = xml.create_element("color", rgba=numerals.format_exact_vector(solid.colour))
+            element.append(xml.create_element("material", colour, name=""))
+        found.append(xml.format_canonical(element))
     return (*found, *content.rest)
 
 
-def _origin(X: Array) -> list[xml.Element]:
+def _write_origin(X: Array) -> list[xml.Element]:
     attributes = {}
     if np.any(X[:3, 3]):
-        attributes["xyz"] = numerals.exact_vector(X[:3, 3])
-    angles = numerals.rpy(X[:3, :3])
+        attributes["xyz"] = numerals.format_exact_vector(X[:3, 3])
+    angles = numerals.compute_rounded_rpy(X[:3, :3])
     if any(angles):
-        attributes["rpy"] = numerals.exact_vector(angles)
-    return [xml.new("origin", **attributes)] if attributes else []
+        attributes["rpy"] = numerals.format_exact_vector(angles)
+    return [xml.create_element("origin", **attributes)] if attributes else []
 
 
-def principal(inertia: Array) -> tuple[Array, Array]:
+def find_principal_axes(inertia: Array) -> tuple[Array, Array]:
     """Return the principal moments (3,) of an inertia and the rotation (3, 3) of their frame, with the smallest
     angle."""
     if not np.any(inertia - np.diag(np.diag(inertia))):
@@ -214,35 +222,35 @@ def principal(inertia: Array) -> tuple[Array, Array]:
     return moments, R
 
 
-def along_z(direction: Array) -> Array:
+def rotate_z_to(direction: Array) -> Array:
     """Return a rotation (3, 3) that takes z to a direction."""
-    z = unit(direction)
-    x = unit(np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [1.0, 0.0, 0.0], z))
+    z = normalise_vector(direction)
+    x = normalise_vector(np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [1.0, 0.0, 0.0], z))
     return np.column_stack((x, np.cross(z, x), z))
 
 
-def unsaid(robot: Mechanism, kinds: Collection[str], *, dialect: str) -> list[Note]:
+def list_unsupported_content(robot: Mechanism, kinds: Collection[str], *, dialect: str) -> list[Note]:
     """Yield a note of all content that a format cannot hold; ``kinds`` are the shapes that it has (none: no masses
     either)."""
     found = []
-    contents = {name: content_of(link, robot) for name, link in robot.links.items()}
+    contents = {name: collect_content(link, robot) for name, link in robot.links.items()}
     if not kinds and any(content.inertial is not None for content in contents.values()):
         found.append("masses and inertias")
-    other = sorted({_tag(each) for content in contents.values() for each in content.rest})
+    other = sorted({_read_tag(each) for content in contents.values() for each in content.rest})
     if other:
         found.append(f"{', '.join(other)} of links")
-    joints = sorted({_tag(each) for joint in robot.joints.values() for each in joint.xml})
+    joints = sorted({_read_tag(each) for joint in robot.joints.values() for each in joint.xml})
     if joints:
         found.append(f"{', '.join(joints)} of joints")
-    whole = sorted({_tag(each) for each in robot.xml} - {"<material>"})
+    whole = sorted({_read_tag(each) for each in robot.xml} - {"<material>"})
     if whole:
         found.append(f"{', '.join(whole)} of the robot")
     for kind in (each for each in SIZES if each not in kinds):
         links = [name for name, content in contents.items() if any(solid.kind == kind for solid in content.solids)]
         if links:
-            found.append(f"the {kind} shapes of {comma_list(links)}")
+            found.append(f"the {kind} shapes of {join_names(links)}")
     return [Note("warning", f"{dialect} has no place for these, which are lost: {'; '.join(found)}")] if found else []
 
 
-def _tag(fragment: str) -> str:
+def _read_tag(fragment: str) -> str:
     return fragment.partition("=")[0] if fragment.startswith("@") else f"<{xml.parse_fragment(fragment).tag}>"

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..budgets import MOST_DEFECTS
+from ..budgets import FILE_DEFECTS_MAX
 from ..errors import BadRobotFile, Defect
-from ..geometry.so3 import rotation_of
-from ..geometry.vectors import Array, unit
+from ..geometry.so3 import convert_from_quaternion
+from ..geometry.vectors import Array, normalise_vector
 from ..mechanism.model import JointType, Limits
-from ..tolerances import WITHOUT_DIRECTION
+from ..tolerances import VECTOR_LENGTH_MIN
 from . import numerals, xml
 from .jointgraph import ORIGIN, Z
 
@@ -37,7 +37,7 @@ class XmlReader:
             value = value[:77] + "..."
         file = line.file if isinstance(line, xml.SourceLine) else self.file
         self.defects.append(Defect(file, line, what, value, allowed))
-        if len(self.defects) >= MOST_DEFECTS:
+        if len(self.defects) >= FILE_DEFECTS_MAX:
             self.require_sound()
 
     def require_sound(self) -> None:
@@ -49,7 +49,7 @@ class XmlReader:
         """Record that a file holds no links."""
         if not found:
             self.defect(
-                xml.line(element),
+                xml.get_line(element),
                 f"no {what}",
                 None,
                 f"{what} and joints; for a file of parts or macros, the file that includes it",
@@ -59,7 +59,7 @@ class XmlReader:
         """Return a required, non-empty attribute."""
         value = element.get(name)
         if value is None or not value.strip():
-            self.defect(xml.line(element), f"<{element.tag}> without {name}")
+            self.defect(xml.get_line(element), f"<{element.tag}> without {name}")
             return None
         return value
 
@@ -78,13 +78,13 @@ class XmlReader:
 
     def numbers(self, element: xml.Element, name: str, default: Iterable[float]) -> Array:
         """Return the numbers of an attribute."""
-        return self.values(element.get(name), default, xml.line(element), f"{name} of <{element.tag}>")
+        return self.values(element.get(name), default, xml.get_line(element), f"{name} of <{element.tag}>")
 
     def only(self, element: xml.Element, tag: str) -> xml.Element | None:
         """Return the child element of that name; a second one is a defect."""
         found = element.findall(tag)
         for extra in found[1:]:
-            self.defect(xml.line(extra), f"second <{tag}> in <{element.tag}>", element.get("name"))
+            self.defect(xml.get_line(extra), f"second <{tag}> in <{element.tag}>", element.get("name"))
         return found[0] if found else None
 
     def pose(self, element: xml.Element | None) -> Array:
@@ -93,7 +93,7 @@ class XmlReader:
             return ORIGIN
         angles = self.numbers(element, "rpy", (0, 0, 0))
         self.digits.angles(angles)
-        return numerals.from_origin(self.numbers(element, "xyz", (0, 0, 0)), angles)
+        return numerals.compute_origin_pose(self.numbers(element, "xyz", (0, 0, 0)), angles)
 
     def origin(self, element: xml.Element) -> Array:
         """Return the pose of the ``<origin>`` of an element."""
@@ -101,9 +101,9 @@ class XmlReader:
 
     def unit(self, values: Array, line: int | None, what: str, given: str | None = None, default: Array = Z) -> Array:
         """Return the unit vector along ``values``; a zero vector is a defect."""
-        if (size := float(np.linalg.norm(values))) > WITHOUT_DIRECTION:
+        if (size := float(np.linalg.norm(values))) > VECTOR_LENGTH_MIN:
             self.digits.length(size)
-            return unit(values)
+            return normalise_vector(values)
         self.defect(line, what, given, "a non-zero vector")
         return default
 
@@ -111,7 +111,7 @@ class XmlReader:
         """Return the unit vector of an attribute."""
         return self.unit(
             self.numbers(element, name, default),
-            xml.line(element),
+            xml.get_line(element),
             f"{name} of <{element.tag}>",
             element.get(name),
             np.array([1.0, 0.0, 0.0]),
@@ -120,11 +120,11 @@ class XmlReader:
     def rotation(self, element: xml.Element, quaternion: Array) -> Array:
         """Return the rotation (3, 3) of a quaternion w x y z of any length but zero."""
         size = float(np.linalg.norm(quaternion))
-        if not size > WITHOUT_DIRECTION:
-            self.defect(xml.line(element), "a quaternion of length zero")
+        if not size > VECTOR_LENGTH_MIN:
+            self.defect(xml.get_line(element), "a quaternion of length zero")
             return np.eye(3)
         self.digits.length(size)
-        return rotation_of(quaternion / size)
+        return convert_from_quaternion(quaternion / size)
 
     def axes(self, element: xml.Element, type_: JointType | None) -> tuple[Array, ...]:
         """Return the axes that the type needs, as unit vectors."""
@@ -132,12 +132,12 @@ class XmlReader:
         for tag in ("axis", "axis2")[: 0 if type_ is None else type_.axes]:
             axis = self.only(element, tag)
             if axis is None and tag == "axis2":
-                self.defect(xml.line(element), "universal loop without <axis2>", element.get("name"))
+                self.defect(xml.get_line(element), "universal loop without <axis2>", element.get("name"))
             axes.append(np.array([1.0, 0.0, 0.0]) if axis is None else self.direction(axis, "xyz", (1, 0, 0)))
         return tuple(axes)
 
 
-def sound_limits(text_of: Callable[[str], str | None], *, bounded: bool = True) -> Limits | None:
+def read_sound_limits(text_of: Callable[[str], str | None], *, bounded: bool = True) -> Limits | None:
     """Return the limits if they are numbers in order, else no limits. ``bounded``: bounds are allowed."""
     values: dict[str, float] = {}
     for key in LIMITS:

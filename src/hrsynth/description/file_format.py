@@ -30,14 +30,14 @@ class RobotFile:
     @property
     def document(self) -> xml.Element:
         """Return the root element. Raises ``BadRobotFile`` if the file is not XML."""
-        return xml.document(xml.content(self.path), str(self.path)) if self.root is None else self.root
+        return xml.parse_document(xml.read_bytes(self.path), str(self.path)) if self.root is None else self.root
 
     @property
     def tag(self) -> str | None:
         """Name of the root element."""
         return None if self.root is None else str(self.root.tag)
 
-    def has(self, tag: str) -> bool:
+    def has_child(self, tag: str) -> bool:
         """Return True if the root has a child element of that name."""
         return self.root is not None and self.root.find(tag) is not None
 
@@ -62,17 +62,17 @@ class Write(Protocol):
     def __call__(self, mechanism: Mechanism) -> Written: ...
 
 
-def as_text(text: str, path: Path) -> bytes:
+def encode_text(text: str, path: Path) -> bytes:
     """Return the bytes of a file that is text."""
     return text.encode()
 
 
-def one_file(path: Path) -> tuple[Path, ...]:
+def list_single_file(path: Path) -> tuple[Path, ...]:
     """Return the files of a format that writes one."""
     return (path,)
 
 
-def alone(path: Path) -> Path | None:
+def return_no_companion(path: Path) -> Path | None:
     """Return None: no other file is read together with this one."""
     return None
 
@@ -91,9 +91,9 @@ class FileFormat:
     name: str
     knows: Callable[[RobotFile], bool]
     endings: tuple[str, ...] = ()
-    files: Callable[[Path], tuple[Path, ...]] = one_file
+    files: Callable[[Path], tuple[Path, ...]] = list_single_file
     rank: int = 0
     begins: tuple[bytes, ...] = ()
-    packed: Callable[[str, Path], bytes] = as_text
+    packed: Callable[[str, Path], bytes] = encode_text
     meshes: tuple[str, ...] | None = None
-    partner: Callable[[Path], Path | None] = alone
+    partner: Callable[[Path], Path | None] = return_no_companion

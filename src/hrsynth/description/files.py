@@ -17,7 +17,7 @@ from ..errors import BadRequest
 from ..processes import require_posix
 
 
-def as_path(file: object) -> Path:
+def convert_to_path(file: object) -> Path:
     """Return the path of a file. Raises ``BadRequest`` for other objects."""
     if not isinstance(file, str | os.PathLike):
         raise BadRequest("a file", file, "its path")
@@ -41,7 +41,7 @@ def require_writable(path: str | Path) -> Path:
     """Return the path of a file to write. Raises ``BadRequest`` if it cannot be written: before long work, not after
     it."""
     require_folder(path)
-    return replaceable(path)
+    return locate_replaceable(path)
 
 
 def require_folder(path: str | Path) -> None:
@@ -50,10 +50,10 @@ def require_folder(path: str | Path) -> None:
     try:
         target = Path(os.path.realpath(path))
         if not target.parent.is_dir():
-            raise _unwritten("no such folder", target.parent)
-        _new_draft(target).unlink()
+            raise _make_write_error("no such folder", target.parent)
+        _create_draft(target).unlink()
     except (OSError, ValueError) as error:
-        raise _unwritten(f"its folder allows no such file ({_reason(error)})", path) from None
+        raise _make_write_error(f"its folder allows no such file ({_describe_os_error(error)})", path) from None
 
 
 def require_other(path: str | Path, *sources: str | Path | None) -> None:
@@ -68,7 +68,7 @@ def require_same(path: Path, content: bytes) -> None:
     try:
         same = not path.exists() or (path.stat().st_size == len(content) and path.read_bytes() == content)
     except (OSError, ValueError) as error:
-        raise _unwritten(_reason(error), path) from None
+        raise _make_write_error(_describe_os_error(error), path) from None
     if not same:
         raise BadRequest(
             "cannot write the file that goes with it: it exists with other content",
@@ -81,23 +81,23 @@ def write_whole(path: str | Path, content: bytes | Iterable[bytes]) -> None:
     """Write a file, at once or piece by piece, under a temporary name, then rename it. Raises ``BadRequest`` if it
     cannot be written."""
     try:
-        with replacement(path) as draft, draft.open("wb") as file:
+        with open_replacement(path) as draft, draft.open("wb") as file:
             file.writelines([content] if isinstance(content, bytes) else content)
     except (OSError, ValueError) as error:
-        raise _unwritten(_reason(error), path) from None
+        raise _make_write_error(_describe_os_error(error), path) from None
 
 
-def replaceable(path: str | Path) -> Path:
+def locate_replaceable(path: str | Path) -> Path:
     """Return the path of a file to be rewritten. Raises ``BadRequest`` for a directory or a device."""
     target = Path(os.path.realpath(path))
     if target.is_dir():
-        raise _unwritten("a directory", path)
+        raise _make_write_error("a directory", path)
     if target.exists() and not target.is_file():
-        raise _unwritten("not a regular file", path)
+        raise _make_write_error("not a regular file", path)
     return target
 
 
-def _unwritten(reason: str, path: str | Path) -> BadRequest:
+def _make_write_error(reason: str, path: str | Path) -> BadRequest:
     return BadRequest(
         f"cannot write the file: {reason}",
         str(path),
@@ -105,11 +105,11 @@ def _unwritten(reason: str, path: str | Path) -> BadRequest:
     )
 
 
-def _reason(error: OSError | ValueError) -> str:
+def _describe_os_error(error: OSError | ValueError) -> str:
     return getattr(error, "strerror", None) or str(error)
 
 
-def _new_draft(target: Path) -> Path:
+def _create_draft(target: Path) -> Path:
     """Make an empty file of a random name next to a file; an existing link of this name is not followed."""
     draft = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
     os.close(os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
@@ -117,11 +117,11 @@ def _new_draft(target: Path) -> Path:
 
 
 @contextlib.contextmanager
-def replacement(path: str | Path, *, sync: bool = False) -> Iterator[Path]:
+def open_replacement(path: str | Path, *, sync: bool = False) -> Iterator[Path]:
     """Yield an empty file next to a file. It replaces the file when the block ends without an error, with ``sync`` only
     once it is on the disk. Raises ``BadRequest`` for a directory or a device, ``OSError`` if the disk refuses."""
-    target = replaceable(path)
-    draft = _new_draft(target)
+    target = locate_replaceable(path)
+    draft = _create_draft(target)
     try:
         yield draft
         if target.exists():
@@ -140,13 +140,13 @@ def open_kept(path: Path, flags: int = os.O_RDWR) -> int:
     return os.open(path, flags | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
 
 
-def seal_line(text: str) -> str:
+def add_checksum(text: str) -> str:
     """Return a line with its checksum appended."""
     return f"{text} {zlib.crc32(text.encode()):08x}"
 
 
 def unseal_line(raw: bytes) -> str | None:
-    """Return the line that :func:`seal_line` sealed, without its end; None if it is damaged."""
+    """Return the line that :func:`add_checksum` sealed, without its end; None if it is damaged."""
     text, _, checksum = raw.rstrip(b"\n").rpartition(b" ")
     return text.decode() if checksum == b"%08x" % zlib.crc32(text) and text.isascii() else None
 

@@ -9,17 +9,17 @@ from functools import cached_property
 
 import numpy as np
 
-from ..geometry.vectors import Array, frozen, hat, inverse, plane_axes, unit
+from ..geometry.vectors import Array, build_plane_axes, freeze_array, hat, invert_pose, normalise_vector
 from ..mechanism import graphs
 from ..mechanism.cameras import NamedCamera
-from ..mechanism.model import JointType, Limits, Link, Motor, Note, fresh_name
+from ..mechanism.model import JointType, Limits, Link, Motor, Note, make_fresh_name
 from ..mechanism.observations.direction import Direction
-from ..mechanism.screws import elementary
+from ..mechanism.screws import split_elementary
 from .numerals import Digits
 from .observation_text import ObservationSpec
 
-ORIGIN = frozen(np.eye(4))
-Z = frozen([0.0, 0.0, 1.0])
+ORIGIN = freeze_array(np.eye(4))
+Z = freeze_array([0.0, 0.0, 1.0])
 LOOP_TYPES = {
     "revolute": JointType.REVOLUTE,
     "continuous": JointType.REVOLUTE,
@@ -42,7 +42,7 @@ _COST = {
     JointType.SPHERICAL: 3,
     JointType.FREE: 5,
 }
-_OUTSIDE = 20
+_NON_TREE_JOINT_COST_COUNT = 20
 """Added to the cost of a joint that the file does not write as part of its tree."""
 
 
@@ -84,14 +84,14 @@ class JointSpec:
     def parts(self) -> list[tuple[Array, Array | None]]:
         """Axis a of each one-dof joint of the equivalent chain, and [a]ₓ if it rotates about a, else None."""
         return [
-            (axis, None if kind is JointType.PRISMATIC else hat(unit(axis)))
-            for kind, axis in elementary(self.kind, self.axes)
+            (axis, None if kind is JointType.PRISMATIC else hat(normalise_vector(axis)))
+            for kind, axis in split_elementary(self.kind, self.axes)
         ]
 
     @cached_property
     def across(self) -> Array:
         """Two unit vectors normal to the first axis and to each other, (2, 3)."""
-        return plane_axes(self.axes[0])
+        return build_plane_axes(self.axes[0])
 
     def frames(self, poses: Mapping[str, Array]) -> tuple[Array, Array]:
         """Return the poses (4, 4) of both joint frames for the links' ``poses``."""
@@ -115,14 +115,14 @@ Posture = Mapping[str, Array]
 """Values of some joints, by name, as in :mod:`.jointmotion`; all others are at zero."""
 
 
-def first_body(
+def find_first_body(
     links: Iterable[str], joined: Iterable[tuple[str, str]], base: str, told: Iterable[str]
 ) -> tuple[str | None, int]:
     """Return the first body of a formation and the number of its parts. A formation has two or more parts, joined only
     by the base, with links that observe or are observed (``told``)."""
     some = set(told) - {base}
     names = [name for name in links if name != base]
-    parts = graphs.components(graphs.adjacency(names, (pair for pair in joined if base not in pair)))
+    parts = graphs.list_components(graphs.build_adjacency(names, (pair for pair in joined if base not in pair)))
     count = sum(1 for part in parts if some & part)
     return next((name for name in names if name in some), None) if count > 1 else None, count
 
@@ -167,12 +167,12 @@ class JointGraph:
     def note_assumed(self) -> None:
         """Record the assumptions about many joints, one note for each kind."""
         for what, names in self.assumed.items():
-            self.note("assumption", f"{what}: {comma_list(names)}")
+            self.note("assumption", f"{what}: {join_names(names)}")
         self.assumed.clear()
 
     def fresh(self, name: str) -> str:
         """Return ``name``, or ``name_2``, ``name_3`` … if it is taken."""
-        return fresh_name(name, self.links, self.joints)
+        return make_fresh_name(name, self.links, self.joints)
 
     @property
     def named(self) -> tuple[set[str | None], set[str]]:
@@ -252,17 +252,19 @@ class JointGraph:
 
     def prune(self, base: str) -> None:
         """Remove links that no chain of joints connects to ``base``, and record them."""
-        kept = graphs.component(graphs.adjacency(self.links, (joint.links for joint in self.joints.values())), base)
+        kept = graphs.find_component(
+            graphs.build_adjacency(self.links, (joint.links for joint in self.joints.values())), base
+        )
         lost = [link for link in self.links if link not in kept]
         if lost:
             what = f"{len(lost)} links that no joint connects to the base {base!r}"
-            self.note("ignored", f"{what}: {comma_list(lost, 5)}")
+            self.note("ignored", f"{what}: {join_names(lost, 5)}")
             self.links = {name: link for name, link in self.links.items() if name in kept}
             self.joints = {name: joint for name, joint in self.joints.items() if set(joint.links) <= kept}
             self.gears = [gear for gear in self.gears if {gear.driver, gear.driven} <= set(self.joints)]
 
 
-def comma_list(names: Iterable[str], most: int = 8, like: str | None = None) -> str:
+def join_names(names: Iterable[str], most: int = 8, like: str | None = None) -> str:
     """Return names separated by commas, the first ones of many; those most ``like`` a text come first."""
     every = list(names)
     if like is not None:
@@ -277,27 +279,27 @@ def scale_pose(X: Array, factor: float) -> Array:
         return X
     larger = X.copy()
     larger[:3, 3] *= factor
-    return frozen(larger)
+    return freeze_array(larger)
 
 
 TreeJoint = tuple[JointSpec, str, str]
 """Joint of a tree, the link nearer to the base, the link that it carries."""
 
 
-def spanning_tree(base: str, joints: Iterable[JointSpec]) -> list[TreeJoint]:
+def build_spanning_tree(base: str, joints: Iterable[JointSpec]) -> list[TreeJoint]:
     """Return the joints of a tree rooted at ``base``, parents first; tree joints of the file come before others, joints
     with fewer dof before joints with more."""
     bonds = list(joints)
     links = dict.fromkeys([base, *(link for joint in bonds for link in joint.links)])
-    weights = [_COST[joint.kind] + (0 if joint.in_tree else _OUTSIDE) for joint in bonds]
-    return graphs.outward(base, graphs.spanning_forest(links, bonds, weights))
+    weights = [_COST[joint.kind] + (0 if joint.in_tree else _NON_TREE_JOINT_COST_COUNT) for joint in bonds]
+    return graphs.order_outward(base, graphs.build_spanning_forest(links, bonds, weights))
 
 
-def zero_poses(base: str, tree: Iterable[TreeJoint]) -> dict[str, Array]:
+def compute_zero_poses(base: str, tree: Iterable[TreeJoint]) -> dict[str, Array]:
     """Return the poses (4, 4) of a tree's links in the base frame, all joints at zero: their two frames coincide."""
     X = {base: ORIGIN}
     for joint, parent, child in tree:
         near, far = joint.ends if joint.links[0] == parent else joint.ends[::-1]
         X_J = X[parent] if near.X is ORIGIN else X[parent] @ near.X
-        X[child] = X_J if far.X is ORIGIN else X_J @ inverse(far.X)
+        X[child] = X_J if far.X is ORIGIN else X_J @ invert_pose(far.X)
     return X

@@ -1,5 +1,5 @@
-"""Process run by :func:`untrusted.output`: read the meshes named on standard input; for each write a line of JSON that
-counts points and triangles, then their bytes."""
+"""Process run by :func:`untrusted.run_program`: read the meshes named on standard input; for each write a line of JSON
+that counts points and triangles, then their bytes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from hrsynth.budgets import PROCESS_BYTES
-from hrsynth.untrusted import packing_defect, refuse
+from hrsynth.untrusted import find_packing_defect, refuse
 
 
 class Beside:
@@ -33,7 +33,7 @@ class Beside:
     get = __getitem__
 
 
-def triangles(path: Path, text: str | None, largest: int) -> tuple[Any, Any] | None:
+def read_mesh(path: Path, text: str | None, largest: int) -> tuple[Any, Any] | None:
     """Return the points (n, 3), all of them corners, and triangles (m, 3) of a mesh from a file or text; None if it
     cannot be read."""
     import numpy as np
@@ -45,7 +45,7 @@ def triangles(path: Path, text: str | None, largest: int) -> tuple[Any, Any] | N
             content = file.read(largest + 1)
         if len(content) > largest:
             return None
-    if wrong := packing_defect(content):
+    if wrong := find_packing_defect(content):
         refuse(f"{path.name}: {wrong}")
     kind = path.suffix.lower().lstrip(".")
     try:
@@ -64,7 +64,7 @@ def main(largest: str) -> None:
     """Write all requested meshes, in order."""
     out = sys.stdout.buffer
     for name, text in json.load(sys.stdin):
-        found = triangles(Path(name), text, int(largest))
+        found = read_mesh(Path(name), text, int(largest))
         out.write(json.dumps(None if found is None else [len(each) for each in found]).encode() + b"\n")
         for each in found or ():
             out.write(each.tobytes())

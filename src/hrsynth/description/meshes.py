@@ -18,13 +18,13 @@ from typing import Any
 
 import numpy as np
 
-from ..budgets import LARGEST_FILE, LARGEST_MESHES, MESH_SECONDS, MOST_MESHES
+from ..budgets import MESH_FILES_MAX, MESH_FILES_MAX_BYTES, MESH_SECONDS, ROBOT_FILE_MAX_BYTES
 from ..errors import BadRequest, HrsynthError
 from ..geometry.vectors import Array
 from ..mechanism.model import Mechanism, Note
-from ..untrusted import output
+from ..untrusted import run_program
 from . import xml
-from .jointgraph import comma_list
+from .jointgraph import join_names
 
 KNOWN = (".stl", ".obj", ".dae", ".ply", ".off", ".msh", ".glb", ".gltf", ".3mf", ".wrl", ".usd", ".usda", ".usdc")
 """Extensions of meshes: no other file is read or copied."""
@@ -36,10 +36,13 @@ PROCESS = Path(__file__).with_name("mesh_process.py")
 def locate_mesh(name: str, folder: Path) -> Path | None:
     """Return the file of a mesh's address: next to the robot file, or of a package in a folder above it; None if it
     does not exist, or lies outside of the robot's folders, links followed."""
-    return next((path for path in _candidates(name, folder) if _belongs(path.resolve(), folder.resolve())), None)
+    return next(
+        (path for path in _list_candidates(name, folder) if _is_in_robot_folders(path.resolve(), folder.resolve())),
+        None,
+    )
 
 
-def _belongs(path: Path, folder: Path) -> bool:
+def _is_in_robot_folders(path: Path, folder: Path) -> bool:
     """Return True if a file lies in the folders of a robot: its package (the nearest folder with a manifest) and
     packages next to it; without one the folder above that of the robot's file, or only that if the one above is the
     user's or holds everything."""
@@ -57,7 +60,7 @@ def _is_package(folder: Path) -> bool:
     return any((folder / name).is_file() for name in MANIFESTS)
 
 
-def _candidates(name: str, folder: Path) -> Iterator[Path]:
+def _list_candidates(name: str, folder: Path) -> Iterator[Path]:
     """Yield the files that an address may refer to."""
     scheme, _, rest = name.partition("://")
     try:
@@ -73,7 +76,7 @@ def _candidates(name: str, folder: Path) -> Iterator[Path]:
         return
 
 
-def triangles(
+def read_robot_meshes(
     names: Iterable[str], robot: str | None, within: Path | None = None
 ) -> dict[str, tuple[Array, Any] | None]:
     """The points (n, 3) and triangles (m, 3) of meshes that the file of a robot names; None for those that cannot be
@@ -85,17 +88,19 @@ def triangles(
     for name in found:
         path = locate_mesh(name, folder)
         if within is not None:
-            path = _within_folder(path or within / Path(name).name, within)
+            path = _find_in_folder(path or within / Path(name).name, within)
         if path is not None and path.suffix.lower() in KNOWN:
             files[name] = str(path.resolve()), None
     files |= {
         name: (f"{name}.obj", text)
-        for name, text in _inner([name for name in found if name not in files], folder, within).items()
+        for name, text in _read_usd_meshes([name for name in found if name not in files], folder, within).items()
     }
     if not files:
         return found
     try:
-        told = io.BytesIO(output(PROCESS, str(LARGEST_FILE), seconds=MESH_SECONDS, given=json.dumps([*files.values()])))
+        told = io.BytesIO(
+            run_program(PROCESS, str(ROBOT_FILE_MAX_BYTES), seconds=MESH_SECONDS, given=json.dumps([*files.values()]))
+        )
     except BadRequest as error:
         raise BadRequest(f"the robot's meshes: {error}") from None
     for name in files:
@@ -108,7 +113,7 @@ def triangles(
     return found
 
 
-def _within_folder(path: Path, within: Path) -> Path | None:
+def _find_in_folder(path: Path, within: Path) -> Path | None:
     """Return a file if it lies in a folder, links resolved, or else the one of its name there."""
     for each in (path, within / path.name):
         if each.is_file() and each.resolve().is_relative_to(within.resolve()):
@@ -116,21 +121,21 @@ def _within_folder(path: Path, within: Path) -> Path | None:
     return None
 
 
-def _inner(names: Iterable[str], folder: Path, within: Path | None = None) -> dict[str, str]:
+def _read_usd_meshes(names: Iterable[str], folder: Path, within: Path | None = None) -> dict[str, str]:
     """Return the meshes that lie in USD files, as the text of ``.obj`` files."""
     asked: dict[Path, dict[str, str]] = {}
     for name in names:
         file, sign, prim = name.partition("#")
         path = locate_mesh(file, folder) if sign and locate_mesh(name, folder) is None else None
         if path is not None and within is not None:
-            path = _within_folder(path, within)
+            path = _find_in_folder(path, within)
         if path is not None:
             asked.setdefault(path, {})[name] = prim
     if not asked:
         return {}
-    from .formats.usd.stage import meshes
+    from .formats.usd.stage import read_usd_meshes
 
-    found = meshes({path: [*prims.values()] for path, prims in asked.items()})
+    found = read_usd_meshes({path: [*prims.values()] for path, prims in asked.items()})
     return {
         name: text
         for prims, texts in zip(asked.values(), found, strict=True)
@@ -155,14 +160,14 @@ def carry_meshes(
     missing, outside, foreign, inside, strange, drawn = (list[str]() for _ in range(6))
     copied: dict[tuple[Path, str], str] = {}
     stems: Counter[str] = Counter()
-    texts = cache(lambda: _inner(drawn, source))
+    texts = cache(lambda: _read_usd_meshes(drawn, source))
 
     def place(name: str) -> str | None:
         """Return the name of a mesh in the new file; None if it is left out."""
         path, (file, sign, prim) = locate_mesh(name, source), name.partition("#")
         inner = locate_mesh(file, source) if path is None and sign else None
         if path is None and inner is None:
-            (outside if any(_candidates(name, source)) else missing).append(name)
+            (outside if any(_list_candidates(name, source)) else missing).append(name)
             return name if endings is None else None
         ending = ".obj" if path is None else path.suffix.lower()
         if endings is not None and (ending not in endings or (inner is not None and not copy) or _is_text(path)):
@@ -174,12 +179,12 @@ def carry_meshes(
             one = (path or inner or source).resolve(), "" if path is not None else prim
             if one in copied:
                 return copied[one]
-            if len(files) >= MOST_MESHES:
+            if len(files) >= MESH_FILES_MAX:
                 raise BadRequest(
-                    f"{robot.name}: too many mesh files", f"more than {MOST_MESHES}", f"up to {MOST_MESHES}"
+                    f"{robot.name}: too many mesh files", f"more than {MESH_FILES_MAX}", f"up to {MESH_FILES_MAX}"
                 )
-            if path is not None and path.stat().st_size > LARGEST_MESHES:
-                raise BadRequest("mesh too large, in bytes", path.stat().st_size, f"up to {LARGEST_MESHES}")
+            if path is not None and path.stat().st_size > MESH_FILES_MAX_BYTES:
+                raise BadRequest("mesh too large, in bytes", path.stat().st_size, f"up to {MESH_FILES_MAX_BYTES}")
             stem = Path(prim).name if path is None else path.stem
             new = folder / "meshes" / f"{stem}{ending}"
             while new in files:
@@ -214,7 +219,7 @@ def carry_meshes(
                     moved[name] = place(name)
                 each.set("filename", moved[name] or "")
             if not any(each.get("filename") == "" for each in meshes):
-                kept.append(fragment if element is None else xml.canonical(element))
+                kept.append(fragment if element is None else xml.format_canonical(element))
         links[title] = replace(link, xml=tuple(kept))
     notes = []
     for names, what in (
@@ -225,7 +230,7 @@ def carry_meshes(
         (inside, "meshes lie in the USD file (--meshes copy writes them as files)"),
     ):
         if names:
-            notes.append(Note("warning", f"{what}: {comma_list(names, 4)}"))
+            notes.append(Note("warning", f"{what}: {join_names(names, 4)}"))
     return replace(robot, links=links, file=str(target)), files, notes
 
 
@@ -248,8 +253,8 @@ def write_meshes(files: dict[Path, Callable[[], bytes]]) -> list[Path]:
         for path, content in files.items():
             data = content()
             size += len(data)
-            if size > LARGEST_MESHES:
-                raise BadRequest("meshes too large, in bytes together", size, f"up to {LARGEST_MESHES}")
+            if size > MESH_FILES_MAX_BYTES:
+                raise BadRequest("meshes too large, in bytes together", size, f"up to {MESH_FILES_MAX_BYTES}")
             require_same(path, data)
             if not path.exists():
                 path.parent.mkdir(exist_ok=True)

@@ -14,11 +14,17 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..budgets import FEWEST_DECIMALS, FEWEST_ROUNDED, LARGEST_NUMBER, MOST_DECIMALS, SURELY_ROUNDED
-from ..geometry.vectors import Array, pose, rotation_about, rotation_from_rpy
-from ..tolerances import EXACT, NEARLY_ONE
+from ..budgets import (
+    FILE_NUMBER_MAX,
+    ROUNDED_DECIMALS_MAX,
+    ROUNDED_DECIMALS_MIN,
+    ROUNDED_NUMBERS_MIN_COUNT,
+    SURELY_ROUNDED_DECIMALS_MIN,
+)
+from ..geometry.vectors import Array, build_pose, convert_rpy_to_rotation, rotate_about_axis
+from ..tolerances import EXACT_INCIDENCE_TOL, ROUNDED_UNIT_VECTOR_TOL
 
-ANGLE_DECIMALS = 13
+ANGLE_DECIMALS_COUNT = 13
 """Decimals of angles and of the components of axes."""
 
 SIMPLE_ANGLE = math.pi / 12
@@ -44,28 +50,28 @@ class Digits:
 
     def length(self, size: float) -> None:
         """Record the length of a vector that should have length one."""
-        self.rounded |= EXACT < abs(size - 1) < NEARLY_ONE
+        self.rounded |= EXACT_INCIDENCE_TOL < abs(size - 1) < ROUNDED_UNIT_VECTOR_TOL
 
     def angles(self, values: Array) -> None:
         """Record angles (rad) that miss a simple fraction of a full rotation by little."""
         steps = np.round(values / SIMPLE_ANGLE)
         misses = np.abs(values - steps * SIMPLE_ANGLE)[steps != 0]
-        self.rounded |= bool(np.any((misses > EXACT) & (misses < NEARLY_ONE)))
+        self.rounded |= bool(np.any((misses > EXACT_INCIDENCE_TOL) & (misses < ROUNDED_UNIT_VECTOR_TOL)))
 
     @property
     def last_place(self) -> float:
         """Size of the last decimal that one in five of the longer numbers reach; if more of them share their count of
         significant digits, that of the coarsest last digit of these; 0 if none are rounded."""
-        longer = sorted(each for each in self.numbers.elements() if each[0] >= FEWEST_DECIMALS)
-        if len(longer) < FEWEST_ROUNDED:
+        longer = sorted(each for each in self.numbers.elements() if each[0] >= ROUNDED_DECIMALS_MIN)
+        if len(longer) < ROUNDED_NUMBERS_MIN_COUNT:
             return 0.0
         decimals = longer[(4 * len(longer)) // 5][0]
         most = max(significant for _, significant in longer)
         full = [each for each, significant in longer if significant == most]
         if len(full) > sum(each == longer[-1][0] for each, _ in longer):
             decimals = full[0]
-        self.rounded |= decimals >= SURELY_ROUNDED
-        return 10.0**-decimals if decimals <= MOST_DECIMALS else 0.0
+        self.rounded |= decimals >= SURELY_ROUNDED_DECIMALS_MIN
+        return 10.0**-decimals if decimals <= ROUNDED_DECIMALS_MAX else 0.0
 
 
 def parse(text: str, count: int) -> Array:
@@ -74,54 +80,54 @@ def parse(text: str, count: int) -> Array:
     for word in words:
         if not _NUMBER.fullmatch(word):
             raise ValueError("finite numbers")
-        if not abs(float(word)) <= LARGEST_NUMBER:
-            raise ValueError(f"numbers up to {LARGEST_NUMBER:g}")
+        if not abs(float(word)) <= FILE_NUMBER_MAX:
+            raise ValueError(f"numbers up to {FILE_NUMBER_MAX:g}")
     if len(words) != count:
         raise ValueError("one number" if count == 1 else f"{count} numbers")
     return np.array([float(word) for word in words])
 
 
-def decimal(value: float, decimals: int) -> str:
+def format_decimal(value: float, decimals: int) -> str:
     """Return ``value`` rounded to ``decimals``, at most 15 significant digits, in its shortest form; -0 is 0."""
     rounded = round(float(value), decimals)
     return f"{rounded:.15g}" if rounded else "0"
 
 
-def exact(value: float) -> str:
+def format_exact(value: float) -> str:
     """Return ``value`` in the shortest form that reads back as the same float; integers without a point."""
     text = repr(float(value))
     return text.removesuffix(".0") if text != "-0.0" else "0"
 
 
-def exact_vector(values: ArrayLike) -> str:
+def format_exact_vector(values: ArrayLike) -> str:
     """Return the numbers of a vector in that form."""
-    return " ".join(exact(value) for value in np.asarray(values, dtype=float))
+    return " ".join(format_exact(value) for value in np.asarray(values, dtype=float))
 
 
-def length_decimals(scale: float) -> int:
+def count_length_decimals(scale: float) -> int:
     """Return the decimals of a length in a robot whose largest coordinate is ``scale`` metres: 14 significant
     digits."""
-    return 13 - math.floor(math.log10(scale * (1 + 1e-7))) if scale > 0 else ANGLE_DECIMALS
+    return 13 - math.floor(math.log10(scale * (1 + 1e-7))) if scale > 0 else ANGLE_DECIMALS_COUNT
 
 
-def vector(values: ArrayLike, decimals: int) -> str:
+def format_vector(values: ArrayLike, decimals: int) -> str:
     """Return the numbers of a vector, each rounded to ``decimals``."""
-    return " ".join(decimal(value, decimals) for value in np.asarray(values, dtype=float))
+    return " ".join(format_decimal(value, decimals) for value in np.asarray(values, dtype=float))
 
 
-def axis(direction: ArrayLike) -> str:
+def format_axis(direction: ArrayLike) -> str:
     """Return a unit vector of shape (3,): two components on the grid, the largest one such that the length is one."""
     values = np.asarray(direction, dtype=float)
     values = values / np.linalg.norm(values)
     sizes = np.abs(values)
     largest = int(np.flatnonzero(sizes >= sizes.max() - 1e-9)[0])
-    grid = [round(float(value), ANGLE_DECIMALS) for value in values]
+    grid = [round(float(value), ANGLE_DECIMALS_COUNT) for value in values]
     rest = sum(value**2 for index, value in enumerate(grid) if index != largest)
     grid[largest] = math.copysign(math.sqrt(max(0.0, 1.0 - rest)), values[largest])
-    return " ".join(decimal(value, 15) for value in grid)
+    return " ".join(format_decimal(value, 15) for value in grid)
 
 
-def rpy(rotation: Array) -> tuple[float, float, float]:
+def compute_rounded_rpy(rotation: Array) -> tuple[float, float, float]:
     """Return roll, pitch, yaw of a rotation (3, 3), rounded.
 
     If the pitch is nearly ±90°, the yaw is rounded as coarsely as it is undetermined, and the roll compensates.
@@ -129,33 +135,33 @@ def rpy(rotation: Array) -> tuple[float, float, float]:
     cosine = math.hypot(rotation[0, 0], rotation[1, 0])
     yaw = 0.0
     if cosine > 1e-13:
-        decimals = min(ANGLE_DECIMALS, math.floor(14.37 + math.log10(cosine)))  # .37: changes at no round number
+        decimals = min(ANGLE_DECIMALS_COUNT, math.floor(14.37 + math.log10(cosine)))  # .37: changes at no round number
         yaw = round(math.atan2(rotation[1, 0], rotation[0, 0]), decimals)
-    rest = rotation_about((0, 0, 1), -yaw) @ rotation
-    pitch = round(math.atan2(-rest[2, 0], rest[0, 0]), ANGLE_DECIMALS)
-    roll = round(math.atan2(-rest[1, 2], rest[1, 1]), ANGLE_DECIMALS)
-    return _half_open(roll), _half_open(pitch), _half_open(yaw)
+    rest = rotate_about_axis((0, 0, 1), -yaw) @ rotation
+    pitch = round(math.atan2(-rest[2, 0], rest[0, 0]), ANGLE_DECIMALS_COUNT)
+    roll = round(math.atan2(-rest[1, 2], rest[1, 1]), ANGLE_DECIMALS_COUNT)
+    return _normalise_half_turn(roll), _normalise_half_turn(pitch), _normalise_half_turn(yaw)
 
 
-def _half_open(angle: float) -> float:
+def _normalise_half_turn(angle: float) -> float:
     """Return the angle, with -π replaced by π."""
     return math.pi if abs(abs(angle) - math.pi) < 1e-12 else angle
 
 
-def origin(X: Array, decimals: int) -> tuple[Array, dict[str, str]]:
+def format_origin(X: Array, decimals: int) -> tuple[Array, dict[str, str]]:
     """Return a pose as the attributes of an ``<origin>``, and the pose (4, 4) that reading them gives."""
     attributes = {}
-    xyz = vector(X[:3, 3], decimals)
+    xyz = format_vector(X[:3, 3], decimals)
     if xyz != "0 0 0":
         attributes["xyz"] = xyz
-    angles = " ".join(decimal(angle, ANGLE_DECIMALS) for angle in rpy(X[:3, :3]))
+    angles = " ".join(format_decimal(angle, ANGLE_DECIMALS_COUNT) for angle in compute_rounded_rpy(X[:3, :3]))
     if angles != "0 0 0":
         attributes["rpy"] = angles
-    return from_origin(parse(xyz, 3), parse(angles, 3)), attributes
+    return compute_origin_pose(parse(xyz, 3), parse(angles, 3)), attributes
 
 
-def from_origin(xyz: Array, angles: Array) -> Array:
+def compute_origin_pose(xyz: Array, angles: Array) -> Array:
     """Return the pose (4, 4) of an ``<origin>``."""
     if not np.any(angles):
-        return pose(xyz)
-    return pose(xyz, rotation_from_rpy(*angles))
+        return build_pose(xyz)
+    return build_pose(xyz, convert_rpy_to_rotation(*angles))

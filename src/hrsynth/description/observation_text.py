@@ -15,15 +15,15 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadRequest, BadRobotFile, Defect
-from ..geometry.vectors import Array, frozen, pose, rotation_from_rpy
+from ..geometry.vectors import Array, build_pose, convert_rpy_to_rotation, freeze_array
 from ..mechanism import Mechanism
 from ..mechanism.cameras import CameraObservation, NamedCamera
 from ..mechanism.observation import Observation
-from ..mechanism.observations import kinds
+from ..mechanism.observations import list_kinds
 from ..mechanism.observations.direction import Direction
 from ..mechanism.observations.encoder import Encoder
 from ..mechanism.observations.inclination import Inclination
-from ..mechanism.sensors import encoders
+from ..mechanism.sensors import make_encoders
 from . import numerals
 
 SEE = "[CAMERA=]KIND:LINK[@x,y,z][/dx,dy,dz][/radius]"
@@ -58,10 +58,10 @@ class ObservationSpec:
         return f"{self.kind} of {self.link!r}"
 
 
-def spec_of(attributes: Mapping[str, str], line: int | None = None) -> ObservationSpec:
+def parse_observe_attributes(attributes: Mapping[str, str], line: int | None = None) -> ObservationSpec:
     """Return the observation of an ``<observe>``. Raises ``BadRequest``."""
     kind = attributes.get("kind", "direction")
-    needs = _needs(kind)
+    needs = _list_needs(kind)
     own = "joint" if "joint" in needs else "link"
     numbers: dict[str, tuple[float, ...]] = {}
     for name, size in (("at", 3), ("axis", 3), ("radius", 1)):
@@ -92,26 +92,26 @@ def spec_of(attributes: Mapping[str, str], line: int | None = None) -> Observati
     )
 
 
-def attributes_of(seen: Observation, mechanism: Mechanism, decimals: int) -> dict[str, str]:
+def list_observe_attributes(seen: Observation, mechanism: Mechanism, decimals: int) -> dict[str, str]:
     """Return the attributes of an ``<observe>``, points with so many decimals. Raises ``BadRequest`` if files do not
     have this kind, or no named camera is on the observing link."""
-    if not isinstance(seen, (*kinds().values(),)):
-        raise BadRequest(f"observation {seen.leg!r}", type(seen).__name__, list(kinds()))
+    if not isinstance(seen, (*list_kinds().values(),)):
+        raise BadRequest(f"observation {seen.leg!r}", type(seen).__name__, list(list_kinds()))
     link = str(seen.seen_from) if isinstance(seen, Inclination) else seen.link
     own = {"joint": seen.joint} if isinstance(seen, Encoder) else {"link": link}
-    found = {**({} if seen.by_segment else {"kind": seen.kind}), "leg": seen.leg, **own}
+    found = {**({} if seen.is_segment_direction else {"kind": seen.kind}), "leg": seen.leg, **own}
     if isinstance(seen, CameraObservation):
-        camera = _eye(mechanism, seen) if seen.camera is None else seen.camera.name
+        camera = _find_camera_name(mechanism, seen) if seen.camera is None else seen.camera.name
         found |= {"camera": camera} if camera else {}
-        found |= {"at": numerals.vector(seen.at, decimals)} if "at" in seen.needs else {}
-        found |= {} if seen.axis is None else {"axis": numerals.axis(seen.axis)}
-        return found | ({} if seen.radius is None else {"radius": numerals.exact(seen.radius)})
-    if isinstance(seen, Direction) and (camera := _eye(mechanism, seen)):
+        found |= {"at": numerals.format_vector(seen.at, decimals)} if "at" in seen.needs else {}
+        found |= {} if seen.axis is None else {"axis": numerals.format_axis(seen.axis)}
+        return found | ({} if seen.radius is None else {"radius": numerals.format_exact(seen.radius)})
+    if isinstance(seen, Direction) and (camera := _find_camera_name(mechanism, seen)):
         found["camera"] = camera
-    return found | ({"axis": numerals.axis(seen.direction)} if isinstance(seen, Direction | Inclination) else {})
+    return found | ({"axis": numerals.format_axis(seen.direction)} if isinstance(seen, Direction | Inclination) else {})
 
 
-def _eye(mechanism: Mechanism, seen: Observation) -> str | None:
+def _find_camera_name(mechanism: Mechanism, seen: Observation) -> str | None:
     """Return the name of a camera on the link from which something is observed; None for the reference link."""
     if seen.seen_from in (None, mechanism.reference):
         return None
@@ -127,7 +127,7 @@ def parse_see(text: str, cameras: Sequence[str]) -> ObservationSpec:
     camera, named, kind = head.rpartition("=")
     if not given or (named and not camera.strip()):
         raise BadRequest(*(("--sensor", text) if not given else (f"--sensor {text}: the camera's name", camera)), SEE)
-    needs = _needs(kind)
+    needs = _list_needs(kind)
     # names of links and joints may have slashes: numbers follow the last @, or have commas
     if "at" in needs:
         link, _, numbers = place.rpartition("@")
@@ -146,20 +146,20 @@ def parse_see(text: str, cameras: Sequence[str]) -> ObservationSpec:
     if "at" in needs:
         if not link:
             raise BadRequest(f"--sensor {text}: point on the link", at, SEE)
-        attributes["at"] = _numbers(at, f"--sensor {text}")
+        attributes["at"] = _parse_numbers(at, f"--sensor {text}")
     for name in ("axis", "radius"):
         if more and (name in needs or f"{name}?" in needs):
-            attributes[name] = _numbers(more.pop(0), f"--sensor {text}")
+            attributes[name] = _parse_numbers(more.pop(0), f"--sensor {text}")
     if more:
         raise BadRequest(
             f"--sensor {text}: too many values for this kind", "/".join(more), ", ".join(needs) or "no more"
         )
-    by_camera = issubclass(kinds()[kind], CameraObservation)
+    by_camera = issubclass(list_kinds()[kind], CameraObservation)
     if by_camera and not camera and len(set(cameras)) > 1:
         raise BadRequest(f"--sensor {text}: no camera named", None, ", ".join(f"{name}={text}" for name in cameras))
     camera = camera or (cameras[0] if by_camera and cameras else "")
     try:
-        found = spec_of(attributes | ({"camera": camera} if camera else {}))
+        found = parse_observe_attributes(attributes | ({"camera": camera} if camera else {}))
     except BadRequest as error:
         raise BadRequest(
             f"--sensor {text}: {error.problem}",
@@ -174,18 +174,18 @@ def split_offers(text: str) -> list[str]:
     """Return the words of a ``--candidate-sensor`` separated by commas, as point:platform,inclination: a kind without a
     link is of the link before it; commas between numbers do not separate."""
     found: list[str] = []
-    for part in re.split(rf",(?=(?:[^,:=@/]+=)?(?:{'|'.join(kinds())})(?:[:,]|$))", text):
+    for part in re.split(rf",(?=(?:[^,:=@/]+=)?(?:{'|'.join(list_kinds())})(?:[:,]|$))", text):
         link = re.sub("/[^/]*,[^/]*$", "", found[-1].partition(":")[2].partition("@")[0]) if found else ""
         found.append(part if ":" in part or not link else f"{part}:{link}")
     return found
 
 
-def offers(text: str, length: float) -> list[str]:
+def expand_candidates(text: str, length: float) -> list[str]:
     """Return the words of ``--sensor`` that ``--candidate-sensor`` stands for: itself, or several points if it names
     only a link, for a characteristic ``length`` (m). Raises ``BadRequest``."""
     head, _, place = text.partition(":")
     kind = head.rpartition("=")[2]
-    needs = kinds()[kind].needs if kind in kinds() else ()
+    needs = list_kinds()[kind].needs if kind in list_kinds() else ()
     if "joint" in needs:
         raise BadRequest(
             f"--candidate-sensor {text}: encoders are always tried on all joints", remedy="Name another kind."
@@ -199,7 +199,7 @@ def offers(text: str, length: float) -> list[str]:
     return found
 
 
-def _numbers(part: str, option: str) -> str:
+def _parse_numbers(part: str, option: str) -> str:
     """Return numbers with spaces in place of commas, as attributes have them. Raises ``BadRequest`` for an empty
     number."""
     if not all(each.strip() for each in part.split(",")):
@@ -218,7 +218,7 @@ def parse_camera(text: str) -> NamedCamera:
     numbers: list[Array] = [np.zeros(3), np.zeros(3)]
     image: list[Any] = [None, None, None]
     for part in parts:
-        _numbers(part, f"--camera {text}")
+        _parse_numbers(part, f"--camera {text}")
     for part in parts[2:]:
         found = part.split(",")
         try:
@@ -238,21 +238,21 @@ def parse_camera(text: str) -> NamedCamera:
             raise BadRequest(f"--camera {text}", part, "metres")
         numbers[number] = values * [math.radians(1) if word and word[2] else 1.0 for word in words]
     focal, width, height = image
-    return NamedCamera(name, link, pose(numbers[0], rotation_from_rpy(*numbers[1])), focal, width, height)
+    return NamedCamera(name, link, build_pose(numbers[0], convert_rpy_to_rotation(*numbers[1])), focal, width, height)
 
 
-def with_sights(
+def add_observations(
     mechanism: Mechanism, specs: Sequence[ObservationSpec], cameras: Iterable[NamedCamera] = ()
 ) -> Mechanism:
     """Return the mechanism with these cameras and observations added. Raises ``BadRequest``."""
     for camera in cameras:
-        mechanism = _with_camera(mechanism, camera)
+        mechanism = _add_camera(mechanism, camera)
     for spec in specs:
-        mechanism = _with_sight(mechanism, spec)
+        mechanism = _add_observation(mechanism, spec)
     return mechanism
 
 
-def as_written(
+def add_file_observations(
     mechanism: Mechanism, specs: Sequence[ObservationSpec], cameras: Sequence[NamedCamera], file: str
 ) -> Mechanism:
     """Return the mechanism with the cameras and observations of a file. Raises ``BadRobotFile`` with all their
@@ -261,7 +261,9 @@ def as_written(
     every: list[NamedCamera | ObservationSpec] = [*cameras, *specs]
     for each in every:
         try:
-            mechanism = _with_camera(mechanism, each) if isinstance(each, NamedCamera) else _with_sight(mechanism, each)
+            mechanism = (
+                _add_camera(mechanism, each) if isinstance(each, NamedCamera) else _add_observation(mechanism, each)
+            )
         except BadRequest as error:
             defects.append(
                 Defect(
@@ -278,14 +280,14 @@ def as_written(
     return mechanism
 
 
-def _with_camera(mechanism: Mechanism, camera: NamedCamera) -> Mechanism:
+def _add_camera(mechanism: Mechanism, camera: NamedCamera) -> Mechanism:
     link = _link(mechanism, camera.link, f"camera {camera.name!r}: unknown link")
     if any(camera.name == each.name for each in mechanism.cameras):
         raise BadRequest("camera name already used", camera.name, "another name")
     return replace(mechanism, cameras=(*mechanism.cameras, replace(camera, link=link)))
 
 
-def _with_sight(mechanism: Mechanism, spec: ObservationSpec) -> Mechanism:
+def _add_observation(mechanism: Mechanism, spec: ObservationSpec) -> Mechanism:
     """Return the mechanism with the observation, labelled by default with its kind and a free number."""
     taken = {o.leg for o in mechanism.observations}
     label = spec.leg or next(f"{spec.kind}_{n}" for n in count(1) if f"{spec.kind}_{n}" not in taken)
@@ -297,13 +299,13 @@ def _with_sight(mechanism: Mechanism, spec: ObservationSpec) -> Mechanism:
 
 def resolve_sight(mechanism: Mechanism, spec: ObservationSpec) -> tuple[Observation, ...]:
     """Return the observations (for a joint with two coordinates, two) of a description. Raises ``BadRequest``."""
-    label, kind = str(spec.leg), kinds()[spec.kind]
+    label, kind = str(spec.leg), list_kinds()[spec.kind]
     if label == "all" or "," in label:
         raise BadRequest(f"observe {spec}: label not usable in a list", label, "a label without commas, other than all")
     if kind is Encoder:
         if spec.link not in mechanism.joints:
             raise BadRequest("observe encoder: unknown joint", spec.link, sorted(mechanism.joints))
-        read = encoders(mechanism, mechanism.joints[spec.link], label)
+        read = make_encoders(mechanism, mechanism.joints[spec.link], label)
         if not read:
             raise BadRequest(
                 f"observe encoder: type of joint {spec.link!r}",
@@ -315,28 +317,34 @@ def resolve_sight(mechanism: Mechanism, spec: ObservationSpec) -> tuple[Observat
     if issubclass(kind, Inclination):
         if link == mechanism.base:
             raise BadRequest("observe inclination: the base does not move", link, "a link that moves")
-        vertical = frozen((0, 0, 1) if spec.axis is None else spec.axis)
+        vertical = freeze_array((0, 0, 1) if spec.axis is None else spec.axis)
         return (Inclination(label, mechanism.base, vertical, seen_from=link, line=spec.line),)
-    camera = _camera(mechanism, spec)
+    camera = _find_camera(mechanism, spec)
     seen_from = mechanism.reference if camera is None else camera.link
     if seen_from == link:
         raise BadRequest(f"observe {spec}: the camera is on the same link", link, "another link")
     if issubclass(kind, Direction):
-        return (Direction(label, link, frozen(spec.axis or ()), line=spec.line, seen_from=seen_from),)
+        return (Direction(label, link, freeze_array(spec.axis or ()), line=spec.line, seen_from=seen_from),)
     assert issubclass(kind, CameraObservation)
     if spec.radius is not None and not (abs(spec.radius) if kind.signed else spec.radius) > 0:
         raise BadRequest(
             f"observe {spec}: radius (m)", spec.radius, "a number other than 0" if kind.signed else "more than 0"
         )
-    axis = None if spec.axis is None else frozen(spec.axis)
+    axis = None if spec.axis is None else freeze_array(spec.axis)
     return (
         kind(
-            label, link, at=frozen(spec.at or (0, 0, 0)), axis=axis, radius=spec.radius, camera=camera, line=spec.line
+            label,
+            link,
+            at=freeze_array(spec.at or (0, 0, 0)),
+            axis=axis,
+            radius=spec.radius,
+            camera=camera,
+            line=spec.line,
         ),
     )
 
 
-def _camera(mechanism: Mechanism, spec: ObservationSpec) -> NamedCamera | None:
+def _find_camera(mechanism: Mechanism, spec: ObservationSpec) -> NamedCamera | None:
     if spec.camera is None:
         return None
     for camera in mechanism.cameras:
@@ -356,7 +364,7 @@ def _link(mechanism: Mechanism, link: str, what: str) -> str:
     return found
 
 
-def _needs(kind: str) -> tuple[str, ...]:
-    if kind not in kinds():
-        raise BadRequest("unknown kind of observation", kind, sorted(kinds()))
-    return kinds()[kind].needs
+def _list_needs(kind: str) -> tuple[str, ...]:
+    if kind not in list_kinds():
+        raise BadRequest("unknown kind of observation", kind, sorted(list_kinds()))
+    return list_kinds()[kind].needs

@@ -10,15 +10,15 @@ from numbers import Real
 import numpy as np
 
 from ..errors import BadRequest
-from ..geometry.vectors import frozen, pose
+from ..geometry.vectors import build_pose, freeze_array
 from ..mechanism.legs import decompose
 from ..mechanism.model import JointType, Mechanism, Motor
-from ..mechanism.normal import normal_form
-from ..mechanism.sensors import observation_of
-from ..tolerances import EXACT, LARGEST_NOISE
+from ..mechanism.normal import reduce_to_normal_form
+from ..mechanism.sensors import observe_segment
+from ..tolerances import EXACT_INCIDENCE_TOL, INCIDENCE_TOL_MAX
 from . import numerals
-from .contents import scaled_shapes
-from .jointgraph import LOOP_TYPES, FrameSpec, JointGraph, comma_list
+from .contents import scale_shapes
+from .jointgraph import LOOP_TYPES, FrameSpec, JointGraph, join_names
 
 CLOSURES = {"3d": JointType.SPHERICAL, "6d": JointType.FIXED, **LOOP_TYPES}
 UNITS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254}
@@ -65,24 +65,24 @@ class Overrides:
                 remedy="Omit one.",
             )
         number = isinstance(tolerance, Real)
-        if tolerance is not None and not (number and EXACT < tolerance <= LARGEST_NOISE):
+        if tolerance is not None and not (number and EXACT_INCIDENCE_TOL < tolerance <= INCIDENCE_TOL_MAX):
             raise BadRequest(
                 "tolerance",
                 f"{tolerance:g}" if number else tolerance,
-                f"{EXACT:g} to {LARGEST_NOISE:g} (characteristic lengths, radians)",
+                f"{EXACT_INCIDENCE_TOL:g} to {INCIDENCE_TOL_MAX:g} (characteristic lengths, radians)",
             )
         return cls(
-            motors=names(motors),
-            close=closures(close),
-            freeze=names(freeze or ()) or (),
-            observe=names(observe),
+            motors=parse_names(motors),
+            close=parse_closures(close),
+            freeze=parse_names(freeze or ()) or (),
+            observe=parse_names(observe),
             tolerance=tolerance,
             as_written=as_written,
             **more,
         )
 
     @property
-    def any(self) -> bool:
+    def has_any(self) -> bool:
         """An option is given that changes the content of the file."""
         return bool(self.close or self.freeze) or any(
             each is not None for each in (self.platform, self.motors, self.unit, self.keyframe)
@@ -118,20 +118,20 @@ class Overrides:
             if self.unit not in UNITS:
                 raise BadRequest("--unit", self.unit, ", ".join(UNITS))
             graph.scale(UNITS[self.unit])
-            graph.links = {name: scaled_shapes(link, UNITS[self.unit]) for name, link in graph.links.items()}
+            graph.links = {name: scale_shapes(link, UNITS[self.unit]) for name, link in graph.links.items()}
             if any("<inertial" in text for link in graph.links.values() for text in link.xml):
                 graph.note("open", f"masses and inertias are not scaled with the unit {self.unit}")
         for closure in self.close:
             _close(graph, closure)
         for name in self.freeze:
             if name not in graph.joints:
-                raise BadRequest("--freeze: no such joint", name, comma_list(graph.joints, like=name))
+                raise BadRequest("--freeze: no such joint", name, join_names(graph.joints, like=name))
             _freeze(graph, name)
         if self.motors is not None:
             _drive(graph, self.motors)
 
 
-def names(value: str | Iterable[str] | None) -> tuple[str, ...] | None:
+def parse_names(value: str | Iterable[str] | None) -> tuple[str, ...] | None:
     """Return a list of names, given as such or as one text with commas."""
     if value is None:
         return None
@@ -141,12 +141,12 @@ def names(value: str | Iterable[str] | None) -> tuple[str, ...] | None:
     return tuple(name.strip() for name in parts)
 
 
-def closures(value: str | Iterable[str]) -> tuple[str, ...]:
+def parse_closures(value: str | Iterable[str]) -> tuple[str, ...]:
     """Return a list of closures, given as such or as one text with commas; points have commas of their own."""
     if not isinstance(value, str):
-        return names(value) or ()
+        return parse_names(value) or ()
     whole = re.fullmatch(rf"\s*{_CLOSURE.pattern}(?:\s*,\s*{_CLOSURE.pattern.replace('?P<', '?P<_')})*\s*", value)
-    return tuple(match[0].strip() for match in _CLOSURE.finditer(value)) if whole else names(value) or ()
+    return tuple(match[0].strip() for match in _CLOSURE.finditer(value)) if whole else parse_names(value) or ()
 
 
 def _freeze(graph: JointGraph, name: str) -> None:
@@ -184,10 +184,12 @@ def _close(graph: JointGraph, wish: str) -> None:
     for end in (match["one"], match["two"]):
         link, at, point = end.partition("@")
         if link not in graph.links:
-            raise BadRequest("--close: no such link", link, comma_list(graph.links, like=link))
+            raise BadRequest("--close: no such link", link, join_names(graph.links, like=link))
         try:
             ends.append(
-                FrameSpec(link, frozen(pose(numerals.parse(point.replace(",", " "), 3)))) if at else FrameSpec(link)
+                FrameSpec(link, freeze_array(build_pose(numerals.parse(point.replace(",", " "), 3))))
+                if at
+                else FrameSpec(link)
             )
         except ValueError as error:
             raise BadRequest("--close: point", end, str(error)) from None
@@ -195,12 +197,12 @@ def _close(graph: JointGraph, wish: str) -> None:
     if one.link == two.link:
         raise BadRequest("--close: both ends are on one link", wish, "two links")
     for name, joint in list(graph.joints.items()):
-        if not joint.in_tree and _same_ends(joint.ends, (one, two)):
+        if not joint.in_tree and _is_same_closure(joint.ends, (one, two)):
             del graph.joints[name]
     graph.close(graph.fresh(f"close_{one.link}_{two.link}"), kind, (one, two))
 
 
-def _same_ends(ends: tuple[FrameSpec, FrameSpec], others: tuple[FrameSpec, FrameSpec]) -> bool:
+def _is_same_closure(ends: tuple[FrameSpec, FrameSpec], others: tuple[FrameSpec, FrameSpec]) -> bool:
     """Return True if two closures join the same two points."""
     table = {end.link: end.X[:3, 3] for end in others}
     return {end.link for end in ends} == set(table) and all(
@@ -215,7 +217,7 @@ def _drive(graph: JointGraph, wanted: Iterable[str]) -> None:
         own = [each for each in graph.joints if name and name in (each, each.rpartition("__")[0])]
         if not own or all(graph.joints[each].type is JointType.FIXED for each in own):
             moving = [each for each, joint in graph.joints.items() if joint.type is not JointType.FIXED]
-            raise BadRequest("--motors: no such movable joint", name, comma_list(moving, like=name))
+            raise BadRequest("--motors: no such movable joint", name, join_names(moving, like=name))
         chosen.update(own)
     for name, joint in graph.joints.items():
         motor = (joint.motor or Motor(f"motor_{name}")) if name in chosen else None
@@ -224,15 +226,15 @@ def _drive(graph: JointGraph, wanted: Iterable[str]) -> None:
 
 def observe_links(mechanism: Mechanism, links: Iterable[str]) -> Mechanism:
     """Return the mechanism with the default segments of the named links as its observed directions."""
-    normal = normal_form(mechanism)
+    normal = reduce_to_normal_form(mechanism)
     legs = decompose(normal.mechanism)
     found = []
     for link in links:
         if normal.into.get(link) not in normal.mechanism.links:
             raise BadRequest(
-                f"{mechanism.name}: not a link of a leg", link, comma_list(normal.mechanism.links, like=link)
+                f"{mechanism.name}: not a link of a leg", link, join_names(normal.mechanism.links, like=link)
             )
-        default = observation_of(legs, normal.into[link])
+        default = observe_segment(legs, normal.into[link])
         turn = mechanism.links[link].pose[:3, :3].T @ normal.mechanism.links[default.link].pose[:3, :3]
         found.append(replace(default, link=link, direction=turn @ default.direction))
     return replace(mechanism, observations=tuple(found))

@@ -10,12 +10,12 @@ from collections.abc import Collection
 from dataclasses import replace
 
 from ..errors import BadRequest
-from ..geometry.vectors import pose
+from ..geometry.vectors import build_pose
 from ..mechanism.model import Joint, JointType, Link, Mechanism, Motor, Note
-from ..mechanism.screws import elementary
+from ..mechanism.screws import split_elementary
 from . import chains
 from .chains import CUT, WELD
-from .tree import spanning
+from .tree import build_spanning_mechanism
 
 
 def reduce(
@@ -30,25 +30,27 @@ def reduce(
 
     Raises ``BadRequest`` if a link in between would get a name that is taken.
     """
-    given = spanning(mechanism if JointType.FREE in tree else mechanism.changed(remove_joints=mechanism.idle))
+    given = build_spanning_mechanism(
+        mechanism if JointType.FREE in tree else mechanism.changed(remove_joints=mechanism.idle)
+    )
     links, joints = dict(given.links), {}
 
     def link(name: str, joint: Joint) -> str:
         chains.require_free(name, joint, links, given.joints)
-        links[name] = Link(name, pose(joint.point))
+        links[name] = Link(name, build_pose(joint.point))
         return name
 
     def put(joint: Joint) -> None:
         if joint.type in tree:
             joints[joint.name] = joint
             return
-        parts = elementary(joint.type, joint.axes)
+        parts = split_elementary(joint.type, joint.axes)
         before = joint.predecessor
         for number, (kind, direction) in enumerate(parts, 1):
-            name = chains.part(joint.name, number)
+            name = chains.name_chain_joint(joint.name, number)
             chains.require_free(name, joint, given.joints)
             after = joint.successor if number == len(parts) else link(name + body, joint)
-            motor = None if joint.motor is None else Motor(chains.part(joint.motor.name, number))
+            motor = None if joint.motor is None else Motor(chains.name_chain_joint(joint.motor.name, number))
             joints[name] = Joint(name, kind, before, after, joint.point, (direction,), motor, joint.limits)
             before = after
 
@@ -58,7 +60,7 @@ def reduce(
     for joint in given.joints.values():
         if joint.in_tree:
             continue
-        if joint.type in (driven if joint.actuated else loops):
+        if joint.type in (driven if joint.is_actuated else loops):
             joints[joint.name] = joint
             continue
         name = link(joint.name + CUT, joint)

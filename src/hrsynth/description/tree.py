@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import BadMechanism
-from ..geometry.vectors import inverse
+from ..geometry.vectors import invert_pose
 from ..mechanism import graphs
 from ..mechanism.model import Joint, JointType, Link, Mechanism
 from . import chains
@@ -23,11 +23,11 @@ _COST = {
     JointType.SPHERICAL: 12,
 }
 """Cost of a joint of this type in the tree; a free joint closes no loop, so it is never one."""
-_OUTSIDE = 20
+_NEW_TREE_JOINT_COST_COUNT = 20
 """Added to the cost of a joint that was no tree joint before."""
 
 
-def spanning(mechanism: Mechanism) -> Mechanism:
+def build_spanning_mechanism(mechanism: Mechanism) -> Mechanism:
     """Return the mechanism with a spanning tree of ``in_tree`` joints rooted at the base, each directed away from the
     base.
 
@@ -41,17 +41,19 @@ def spanning(mechanism: Mechanism) -> Mechanism:
     BadMechanism
         For a link without a joint, or a joint between two links of the tree with six dof.
     """
-    mechanism = _in_base_frame(mechanism)
+    mechanism = _move_to_base_frame(mechanism)
     return chains.merge(mechanism if is_spanning(mechanism) else _cut(mechanism))
 
 
 def _cut(mechanism: Mechanism) -> Mechanism:
     """Return the mechanism with a new spanning tree."""
-    lost = set(mechanism.links) - graphs.component(mechanism.adjacency, mechanism.base)
+    lost = set(mechanism.links) - graphs.find_component(mechanism.adjacency, mechanism.base)
     if lost:
         raise BadMechanism("link not connected to the base by joints", min(lost))
     joints = list(mechanism.joints.values())
-    chosen = {joint.name for joint in graphs.spanning_forest(mechanism.links, joints, [_cost(j) for j in joints])}
+    chosen = {
+        joint.name for joint in graphs.build_spanning_forest(mechanism.links, joints, [_weigh_joint(j) for j in joints])
+    }
 
     links: dict[str, Link] = {}
     tree: dict[str, Joint] = {}
@@ -90,31 +92,31 @@ def is_spanning(mechanism: Mechanism) -> bool:
         return False
     if any(joint.type is JointType.FREE and not joint.in_tree for joint in mechanism.joints.values()):
         return False
-    return len(outward(mechanism)) == count
+    return len(list_outward_joints(mechanism)) == count
 
 
 def is_connected(mechanism: Mechanism) -> bool:
     """Return True if chains of joints connect every link to the base."""
-    return len(graphs.component(mechanism.adjacency, mechanism.base)) == len(mechanism.links)
+    return len(graphs.find_component(mechanism.adjacency, mechanism.base)) == len(mechanism.links)
 
 
-def outward(mechanism: Mechanism) -> list[Joint]:
+def list_outward_joints(mechanism: Mechanism) -> list[Joint]:
     """Return the tree joints of the base's tree, every joint after the one that carries its predecessor."""
     tree = [joint for joint in mechanism.joints.values() if joint.in_tree]
-    return [joint for joint, _, _ in graphs.outward(mechanism.base, tree)]
+    return [joint for joint, _, _ in graphs.order_outward(mechanism.base, tree)]
 
 
-def _cost(joint: Joint) -> int:
+def _weigh_joint(joint: Joint) -> int:
     if joint.type is JointType.FREE:
         return 0
-    return _COST[joint.type] + (not joint.actuated) + (0 if joint.in_tree else _OUTSIDE)
+    return _COST[joint.type] + (not joint.is_actuated) + (0 if joint.in_tree else _NEW_TREE_JOINT_COST_COUNT)
 
 
-def _in_base_frame(mechanism: Mechanism) -> Mechanism:
+def _move_to_base_frame(mechanism: Mechanism) -> Mechanism:
     X_WB = mechanism.links[mechanism.base].pose
     if np.array_equal(X_WB, np.eye(4)):
         return mechanism
-    X_BW = inverse(X_WB)
+    X_BW = invert_pose(X_WB)
     links = {name: replace(link, pose=X_BW @ link.pose) for name, link in mechanism.links.items()}
     links[mechanism.base] = replace(links[mechanism.base], pose=np.eye(4))
     joints = {

@@ -12,10 +12,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from ..budgets import MOST_UNKNOWN_NAMES
+from ..budgets import XML_UNKNOWN_NAMES_MAX
 from ..errors import Defect
 from ..mechanism.model import Note
-from ..tolerances import LIKE_A_WORD
+from ..tolerances import NAME_SIMILARITY_MIN
 from . import xml
 from .file_format import RobotFile
 
@@ -48,7 +48,7 @@ class UnknownName:
     @property
     def line(self) -> int | None:
         """Line of the element that has the attribute, or of the element itself."""
-        return xml.line(self.element)
+        return xml.get_line(self.element)
 
     @property
     def place(self) -> str:
@@ -66,7 +66,7 @@ class UnknownName:
     @property
     def remedy(self) -> str:
         """Names of which it is a misspelling, or the most similar one, as they are written."""
-        alike = difflib.get_close_matches(self.name.casefold(), self.known, n=1, cutoff=LIKE_A_WORD)
+        alike = difflib.get_close_matches(self.name.casefold(), self.known, n=1, cutoff=NAME_SIMILARITY_MIN)
         return " or ".join(map(self._written, self.meant or alike))
 
     def _written(self, name: str) -> str:
@@ -111,7 +111,7 @@ class Vocabulary:
         key, met = str(root.tag), set[tuple[str, str]]()
         for each in self._of(root, self.elements[key]) if key in self.elements else ():
             met.add((each.name, each.place))
-            if len(met) > MOST_UNKNOWN_NAMES:
+            if len(met) > XML_UNKNOWN_NAMES_MAX:
                 return
             yield each
 
@@ -119,10 +119,10 @@ class Vocabulary:
         given = [str(name) for name in element.attrib]
         for name in given:
             if name not in known.attributes and not self.is_other(name):
-                meant = misspelt(name, known.attributes.difference(given))
+                meant = find_misspelt(name, known.attributes.difference(given))
                 if meant or not known.open:
                     yield UnknownName(element, name, True, known.attributes, meant)
-        children = xml.children(element)
+        children = xml.list_children(element)
         tags = {str(child.tag) for child in children}
         for child in children:
             tag = str(child.tag)
@@ -133,7 +133,7 @@ class Vocabulary:
                 if names is not None:
                     yield from inner._of(child, names)
             elif not self.is_other(tag):
-                meant = misspelt(tag, known.children - (tags - known.repeated))
+                meant = find_misspelt(tag, known.children - (tags - known.repeated))
                 if meant or not known.open:
                     yield UnknownName(child, tag, False, known.children, meant)
 
@@ -147,9 +147,9 @@ class Vocabulary:
             elif not file.as_spelt:
                 where = getattr(each.line, "file", str(file.path))
                 defects.append(Defect(where, each.line, f"unknown {each.place}", each.found, each.remedy))
-        if len({(each.problem, each.got) for each in defects}) + len(notes) >= MOST_UNKNOWN_NAMES:
-            raise xml.refusal(
-                file.path, "too many names that the format does not have", f"fewer than {MOST_UNKNOWN_NAMES}"
+        if len({(each.problem, each.got) for each in defects}) + len(notes) >= XML_UNKNOWN_NAMES_MAX:
+            raise xml.make_file_error(
+                file.path, "too many names that the format does not have", f"fewer than {XML_UNKNOWN_NAMES_MAX}"
             )
         return defects, [_note_of(found) for found in notes.values()]
 
@@ -162,13 +162,15 @@ def _note_of(found: list[UnknownName]) -> Note:
     return Note("ignored", f"unknown {first.place}: got {first.found}{alike}{where}")
 
 
-def misspelt(name: str, known: Iterable[str]) -> tuple[str, ...]:
+def find_misspelt(name: str, known: Iterable[str]) -> tuple[str, ...]:
     """Return the ``known`` names that one edit makes of a name, in order; letter case, ``-`` and ``_`` are ignored."""
-    plain = _plain(name)
-    return tuple(sorted(each for each in known if plain == (other := _plain(each)) or _is_one_edit(plain, other)))
+    plain = _strip_accents(name)
+    return tuple(
+        sorted(each for each in known if plain == (other := _strip_accents(each)) or _is_one_edit(plain, other))
+    )
 
 
-def _plain(name: str) -> str:
+def _strip_accents(name: str) -> str:
     return name.casefold().replace("-", "").replace("_", "")
 
 

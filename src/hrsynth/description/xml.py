@@ -12,7 +12,13 @@ from typing import Any, TypeAlias
 
 from lxml import etree
 
-from ..budgets import LARGEST_FILE, MOST_ATTRIBUTES, MOST_ELEMENTS, MOST_NAMES, MOST_PREFIXES
+from ..budgets import (
+    ROBOT_FILE_MAX_BYTES,
+    XML_ATTRIBUTES_MAX,
+    XML_ELEMENT_NAMES_MAX,
+    XML_ELEMENTS_MAX,
+    XML_REPARSES_MAX,
+)
 from ..errors import BadRequest, BadRobotFile, Defect
 from ..mechanism.model import Note
 from .files import NotRegular, open_regular
@@ -30,71 +36,71 @@ _DECLARATION = re.compile(rb"<!\s*(DOCTYPE|ENTITY)")
 _ATTRIBUTE = re.compile(r"@(?P<name>(\{[^}]*\})?[^=]*)=(?P<value>.*)", re.DOTALL)
 
 
-def _parser() -> etree.XMLParser:
+def _make_parser() -> etree.XMLParser:
     return etree.XMLParser(
         resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False, remove_comments=False, remove_pis=True
     )
 
 
-def refusal(
+def make_file_error(
     file: str | Path, what: str, allowed: str | None = None, *, value: str | None = None, line: int | None = None
 ) -> BadRobotFile:
     """Return the error of a file with one defect, or of a file as a whole."""
     return BadRobotFile([Defect(str(file), line, what, value, allowed)])
 
 
-def content(path: str | Path) -> bytes:
+def read_bytes(path: str | Path) -> bytes:
     """Return the bytes of a robot file. Raises :class:`BadRobotFile` for a file that cannot be read or is too large."""
-    most = f"up to {LARGEST_FILE}"
+    most = f"up to {ROBOT_FILE_MAX_BYTES}"
     try:
         with open_regular(path) as stream:
-            if (size := os.fstat(stream.fileno()).st_size) > LARGEST_FILE:
-                raise refusal(path, "file too large", most, value=f"{size} bytes")
-            data = stream.read(LARGEST_FILE + 1)
+            if (size := os.fstat(stream.fileno()).st_size) > ROBOT_FILE_MAX_BYTES:
+                raise make_file_error(path, "file too large", most, value=f"{size} bytes")
+            data = stream.read(ROBOT_FILE_MAX_BYTES + 1)
     except NotRegular as error:
-        raise refusal(path, str(error.strerror), "a robot file") from None
+        raise make_file_error(path, str(error.strerror), "a robot file") from None
     except FileNotFoundError:
-        raise refusal(path, "no such file", "the path of an existing file") from None
+        raise make_file_error(path, "no such file", "the path of an existing file") from None
     except (OSError, ValueError) as error:
-        raise refusal(
+        raise make_file_error(
             path, "cannot be read", "a readable file", value=getattr(error, "strerror", None) or str(error)
         ) from None
-    if len(data) > LARGEST_FILE:
-        raise refusal(path, "file too large", most, value=f"more than {LARGEST_FILE} bytes")
+    if len(data) > ROBOT_FILE_MAX_BYTES:
+        raise make_file_error(path, "file too large", most, value=f"more than {ROBOT_FILE_MAX_BYTES} bytes")
     return data
 
 
-def document(text: bytes | str, file: str, notes: list[Note] | None = None) -> Element:
+def parse_document(text: bytes | str, file: str, notes: list[Note] | None = None) -> Element:
     """Return the root element of an XML document. Raises :class:`BadRobotFile` with the line of the first error.
 
     With ``notes``, comments with ``--`` are left out and undeclared prefixes are read as declared; both are noted.
     """
     data = text.encode() if isinstance(text, str) else text
     if not data.strip():
-        raise refusal(file, "empty file", "a robot file", line=1)
+        raise make_file_error(file, "empty file", "a robot file", line=1)
     try:
         data.decode("utf-8")
     except UnicodeDecodeError as error:
-        raise refusal(
+        raise make_file_error(
             file,
             "not UTF-8 text",
             "a file in UTF-8",
             value=hex(data[error.start]),
             line=data.count(b"\n", 0, error.start) + 1,
         ) from None
-    if (count := data.count(b"<") - data.count(b"</")) > MOST_ELEMENTS:
-        raise refusal(file, "too many elements", f"up to {MOST_ELEMENTS}", value=str(count))
+    if (count := data.count(b"<") - data.count(b"</")) > XML_ELEMENTS_MAX:
+        raise make_file_error(file, "too many elements", f"up to {XML_ELEMENTS_MAX}", value=str(count))
     data = _BREAK.sub(b" ", data)
-    bare = _without_comments(data, lambda comment: True)
+    bare = _drop_comments(data, lambda comment: True)
     if declaration := _DECLARATION.search(bare):
-        raise refusal(
+        raise make_file_error(
             file,
             "a document type declaration is not allowed",
             line=bare.count(b"\n", 0, declaration.start()) + 1,
         )
-    for _ in range(MOST_PREFIXES):
+    for _ in range(XML_REPARSES_MAX):
         try:
-            root = etree.fromstring(data, _parser())
+            root = etree.fromstring(data, _make_parser())
             _require_few_names(root, file)
             if root.getroottree().docinfo.internalDTD is None:
                 return root
@@ -103,13 +109,13 @@ def document(text: bytes | str, file: str, notes: list[Note] | None = None) -> E
             what, at = (error.msg or "syntax error").split(", line ")[0], error.lineno or 1
         except (ValueError, LookupError) as error:
             what, at = str(error), 1
-        mended = data if notes is None else _mend(data, what, notes)
+        mended = data if notes is None else _repair_document(data, what, notes)
         if mended == data:
             break
         data = mended
     # raised here, not above: libraries that send errors between processes take their context along, and the parser's
     # own error cannot be sent
-    raise refusal(file, "malformed XML", "a whole XML document", value=what, line=at)
+    raise make_file_error(file, "malformed XML", "a whole XML document", value=what, line=at)
 
 
 def _require_few_names(root: Element, file: str) -> None:
@@ -117,19 +123,21 @@ def _require_few_names(root: Element, file: str) -> None:
     names = set()
     for element in root.iter("*"):
         names.add(element.tag)
-        if len(element.attrib) > MOST_ATTRIBUTES:
-            raise refusal(
+        if len(element.attrib) > XML_ATTRIBUTES_MAX:
+            raise make_file_error(
                 file,
                 f"too many attributes of <{element.tag}>",
-                f"up to {MOST_ATTRIBUTES}",
+                f"up to {XML_ATTRIBUTES_MAX}",
                 value=str(len(element.attrib)),
-                line=line(element),
+                line=get_line(element),
             )
-    if len(names) > MOST_NAMES:
-        raise refusal(file, "too many different elements", f"up to {MOST_NAMES}", value=str(len(names)))
+    if len(names) > XML_ELEMENT_NAMES_MAX:
+        raise make_file_error(
+            file, "too many different elements", f"up to {XML_ELEMENT_NAMES_MAX}", value=str(len(names))
+        )
 
 
-def _mend(data: bytes, what: str, notes: list[Note]) -> bytes:
+def _repair_document(data: bytes, what: str, notes: list[Note]) -> bytes:
     """Return a document without what stopped the parser, if that has no meaning; the lines stay."""
     prefix, root = _PREFIX.search(what), _ROOT.match(data)
     if prefix is not None and root is not None:
@@ -143,7 +151,7 @@ def _mend(data: bytes, what: str, notes: list[Note]) -> bytes:
         return data[: root.end()] + declared + data[root.end() :]
     if "comment" not in what.lower():
         return data
-    wrong = [start for start, end in _comments(data) if _is_wrong(data[start:end])]
+    wrong = [start for start, end in _find_comments(data) if _is_wrong(data[start:end])]
     if wrong:
         line = data.count(b"\n", 0, wrong[0]) + 1
         notes.append(
@@ -154,10 +162,10 @@ def _mend(data: bytes, what: str, notes: list[Note]) -> bytes:
                 else f"a comment that holds '--', which XML does not allow, in line {line}",
             )
         )
-    return _without_comments(data, _is_wrong)
+    return _drop_comments(data, _is_wrong)
 
 
-def _comments(data: bytes) -> Iterator[tuple[int, int]]:
+def _find_comments(data: bytes) -> Iterator[tuple[int, int]]:
     """Yield start and end of comments and processing instructions; each byte is read a bounded number of times."""
     starts, done = dict.fromkeys(_CLOSED_BY, 0), 0
     while starts:
@@ -176,10 +184,10 @@ def _comments(data: bytes) -> Iterator[tuple[int, int]]:
         yield start, done
 
 
-def _without_comments(data: bytes, left_out: Callable[[bytes], bool]) -> bytes:
+def _drop_comments(data: bytes, left_out: Callable[[bytes], bool]) -> bytes:
     """Return a document without some of its comments; the lines stay."""
     parts, at = [], 0
-    for start, end in _comments(data):
+    for start, end in _find_comments(data):
         comment = data[start:end]
         if left_out(comment):
             parts += [data[at:start], b"\n" * comment.count(b"\n")]
@@ -195,11 +203,11 @@ def _is_wrong(comment: bytes) -> bool:
 PLACES = "{urn:hrsynth}places"
 """Attribute of a root element with the files and lines of a generated document; the elements' own lines are indices of
 it."""
-MOST_PLACES = 65535
+XML_LINE_MAX = 65535
 """Number of lines that an element can have."""
 
 
-def beside(main: Path, file: str) -> str:
+def shorten_path(main: Path, file: str) -> str:
     """Return the name of a file relative to the ``main`` one if it lies in its folder or below."""
     folder, own = main.resolve().parent, Path(file).resolve()
     return str(main.parent / own.relative_to(folder)) if own.is_relative_to(folder) else file
@@ -213,14 +221,14 @@ def give_places(root: Element, main: Path, places: Sequence[tuple[str, int] | No
         own = None
         if place is not None:
             file, line = place
-            own = names.get(file, file) and beside(main, file), line
+            own = names.get(file, file) and shorten_path(main, file), line
         number = table.setdefault(own, len(table) + 1)
-        element.sourceline = number if number <= MOST_PLACES else 0  # type: ignore[assignment]
+        element.sourceline = number if number <= XML_LINE_MAX else 0  # type: ignore[assignment]
     root.set(PLACES, json.dumps(list(table)))
 
 
 @lru_cache(maxsize=8)
-def _places(text: str) -> list[list[Any] | None]:
+def _locate_elements(text: str) -> list[list[Any] | None]:
     found: list[list[Any] | None] = json.loads(text)
     return found
 
@@ -231,12 +239,12 @@ class SourceLine(int):
     file: str
 
 
-def line(element: Element) -> int | None:
+def get_line(element: Element) -> int | None:
     """Return the line of its file in which an element starts; a :class:`SourceLine` for an included file."""
     number: object = element.sourceline
     table = element.getroottree().getroot().get(PLACES)
     if table is not None:
-        place = _places(table)[number - 1] if isinstance(number, int) and number else None
+        place = _locate_elements(table)[number - 1] if isinstance(number, int) and number else None
         if place is None:
             return None
         own = SourceLine(place[1])
@@ -249,14 +257,14 @@ def line(element: Element) -> int | None:
     return found
 
 
-def children(element: Element) -> list[Element]:
+def list_children(element: Element) -> list[Element]:
     """Return the child elements, without comments."""
     return [child for child in element if isinstance(child.tag, str)]
 
 
-def canonical(element: Element) -> str:
+def format_canonical(element: Element) -> str:
     """Return an element as one line of text with the same meaning; stable when written and read again."""
-    copy = etree.fromstring(etree.tostring(element, with_tail=False, encoding="utf-8"), _parser())
+    copy = etree.fromstring(etree.tostring(element, with_tail=False, encoding="utf-8"), _make_parser())
     for part in copy.iter():
         if part.text is not None and not part.text.strip():
             part.text = None
@@ -266,23 +274,23 @@ def canonical(element: Element) -> str:
     return etree.tostring(copy, encoding="unicode")
 
 
-def new(tag: str, *children: Element, **attributes: str) -> Element:
+def create_element(tag: str, *children: Element, **attributes: str) -> Element:
     """Return an element with its attributes and child elements."""
     element = etree.Element(tag, attributes)
     element.extend(children)
     return element
 
 
-def unknown(element: Element, attributes: Iterable[str], tags: Iterable[str]) -> tuple[str, ...]:
+def list_unknown(element: Element, attributes: Iterable[str], tags: Iterable[str]) -> tuple[str, ...]:
     """Return the unknown parts of an element: ``@name=value`` for attributes, then child elements."""
     known_attributes, known_tags = set(attributes), set(tags)
     given = sorted((str(name), str(value)) for name, value in element.attrib.items() if name != PLACES)
     found = [f"@{name}={value}" for name, value in given if name not in known_attributes]
-    return (*found, *(canonical(child) for child in children(element) if child.tag not in known_tags))
+    return (*found, *(format_canonical(child) for child in list_children(element) if child.tag not in known_tags))
 
 
 def restore(element: Element, fragments: Iterable[str]) -> None:
-    """Put back the parts that :func:`unknown` returned."""
+    """Put back the parts that :func:`list_unknown` returned."""
     for fragment in fragments:
         if attribute := _ATTRIBUTE.fullmatch(fragment):
             element.set(attribute["name"], attribute["value"])
@@ -293,12 +301,12 @@ def restore(element: Element, fragments: Iterable[str]) -> None:
 def parse_fragment(fragment: str) -> Element:
     """Return the element of a kept fragment. Raises :class:`BadRequest` if it is not XML."""
     try:
-        return etree.fromstring(fragment.encode(), _parser())
+        return etree.fromstring(fragment.encode(), _make_parser())
     except etree.XMLSyntaxError as error:
         raise BadRequest("a kept fragment is not XML", fragment, error.msg) from None
 
 
-def text_of(root: Element) -> str:
+def format_document(root: Element) -> str:
     """Return a document as text, indented by two spaces."""
     etree.indent(root, "  ")
     return '<?xml version="1.0" encoding="utf-8"?>\n' + etree.tostring(root, encoding="unicode") + "\n"

@@ -1,5 +1,5 @@
 """Parametric constructors of the papers' robots, one module a family; the files in ``robots/`` are made from them."""
 
-from .table import ROBOTS, Shipped
+from .table import ROBOTS, ShippedRobot
 
-__all__ = ["ROBOTS", "Shipped"]
+__all__ = ["ROBOTS", "ShippedRobot"]

@@ -22,7 +22,7 @@ def main(folder: str = "robots", *names: str) -> list[Path]:
     shipped, target = {robot.name: robot.make for robot in ROBOTS}, Path(folder)
     makers: dict[str, Callable[[], Mechanism]] = {
         **shipped,
-        **{name: partial(_linkage, name) for name in LINKAGES},
+        **{name: partial(_build_linkage, name) for name in LINKAGES},
         "six_poses": six_poses,
     }
     if folder.startswith("-"):
@@ -37,7 +37,7 @@ def main(folder: str = "robots", *names: str) -> list[Path]:
     return files
 
 
-def _linkage(name: str) -> Mechanism:
+def _build_linkage(name: str) -> Mechanism:
     return LINKAGES[name]().mechanism(name)
 
 

@@ -14,10 +14,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..geometry.vectors import Array, rotation_about
+from ..geometry.vectors import Array, rotate_about_axis
 from ..mechanism.builder import Builder
 from ..mechanism.model import Mechanism
-from .geometry import THREE_ANGLES, Z, on_circle, on_line, polar, radial, six_angles, six_tips, tangent, wrist
+from .geometry import (
+    THREE_ANGLES,
+    Z,
+    add_wrist,
+    compute_polar_point,
+    compute_radial,
+    compute_tangent,
+    list_six_angles,
+    locate_on_circle,
+    locate_on_line,
+    locate_six_tips,
+)
 
 QUATTRO_ANGLES = (-3 * math.pi / 4, -math.pi / 4, math.pi / 4, 3 * math.pi / 4)
 """θ_i of both Quattros (rad): MMT Appendix B.1, IROS IV-A."""
@@ -43,23 +54,25 @@ class _DrivenLeg:
         return f"{link}_{leg}"
 
 
-def _on_arm(angle: float, radius: float, C: Array, proximal: float, distal: float) -> _DrivenLeg:
+def _make_arm_leg(angle: float, radius: float, C: Array, proximal: float, distal: float) -> _DrivenLeg:
     """A leg whose arm turns about A_i, at ``angle`` on a circle: knee outwards, ‖C_i − B_i‖ = ``distal``."""
-    A = polar(radius, angle)
-    B = on_circle(A, radial(angle), Z, proximal, C, distal, outward=True)
-    return _DrivenLeg("R", A, -tangent(angle), B, C, tangent(angle))
+    A = compute_polar_point(radius, angle)
+    B = locate_on_circle(A, compute_radial(angle), Z, proximal, C, distal, outward=True)
+    return _DrivenLeg("R", A, -compute_tangent(angle), B, C, compute_tangent(angle))
 
 
-def _on_rail(start: Array, direction: Array, C: Array, distal: float, side: Array, forward: bool = True) -> _DrivenLeg:
+def _make_rail_leg(
+    start: Array, direction: Array, C: Array, distal: float, side: Array, forward: bool = True
+) -> _DrivenLeg:
     """A leg whose slider moves on a rail, with ‖C_i − B_i‖ = ``distal``."""
-    B = on_line(start, direction, C, distal, forward)
+    B = locate_on_line(start, direction, C, distal, forward)
     return _DrivenLeg("P", B, direction, B, C, side)
 
 
-def _on_inclined_rail(angle: float, radius: float, slope: float, C: Array, distal: float) -> _DrivenLeg:
+def _make_inclined_rail_leg(angle: float, radius: float, slope: float, C: Array, distal: float) -> _DrivenLeg:
     """A leg whose rail starts at ``angle`` on a circle, descending outwards by ``slope`` (rad) below the horizontal."""
-    direction = math.cos(slope) * radial(angle) - math.sin(slope) * Z
-    return _on_rail(polar(radius, angle), direction, C, distal, tangent(angle))
+    direction = math.cos(slope) * compute_radial(angle) - math.sin(slope) * Z
+    return _make_rail_leg(compute_polar_point(radius, angle), direction, C, distal, compute_tangent(angle))
 
 
 def _add_pairs(b: Builder, legs: Iterable[_DrivenLeg], half: float, plates: Sequence[str]) -> None:
@@ -74,7 +87,7 @@ def _add_pairs(b: Builder, legs: Iterable[_DrivenLeg], half: float, plates: Sequ
             b.joint(f"wrist_{leg}{letter}", "S", rod, plate, at=each.C + offset, loop=(leg, letter) != (1, "a"))
 
 
-def _of_pairs(name: str, home: Array, legs: Sequence[_DrivenLeg], half: float) -> Mechanism:
+def _build_from_pairs(name: str, home: Array, legs: Sequence[_DrivenLeg], half: float) -> Mechanism:
     """n-R̲-{2-SS} or n-P̲-{2-SS} with a rigid platform, its frame at ``home``."""
     b = Builder(name)
     b.link("base")
@@ -83,7 +96,7 @@ def _of_pairs(name: str, home: Array, legs: Sequence[_DrivenLeg], half: float) -
     return b.build(platform="platform")
 
 
-def _of_rods(name: str, home: Array, legs: Sequence[_DrivenLeg], end: str) -> Mechanism:
+def _build_from_rods(name: str, home: Array, legs: Sequence[_DrivenLeg], end: str) -> Mechanism:
     """Legs that end in one rod: U at B_i (its second axis normal to the first and the rod), then S or U at C_i."""
     b = Builder(name)
     b.link("base")
@@ -91,7 +104,7 @@ def _of_rods(name: str, home: Array, legs: Sequence[_DrivenLeg], end: str) -> Me
         proximal, second = each.add(b, leg), np.cross(each.side, each.C - each.B)
         b.link(f"rod_{leg}", at=each.B)
         b.joint(f"elbow_{leg}", "U", proximal, f"rod_{leg}", at=each.B, axis=each.side, axis2=second)
-        wrist(b, leg, end, each.C, second, each.side)
+        add_wrist(b, leg, end, each.C, second, each.side)
     b.link("platform", at=home)
     return b.build(platform="platform")
 
@@ -119,8 +132,11 @@ def delta(
         P at the zero configuration, shape (3,).
     """
     P = np.asarray(home, dtype=float)
-    legs = [_on_arm(a, base_radius, P + polar(platform_radius, a), proximal, distal) for a in THREE_ANGLES]
-    return _of_pairs("delta", P, legs, half_width)
+    legs = [
+        _make_arm_leg(a, base_radius, P + compute_polar_point(platform_radius, a), proximal, distal)
+        for a in THREE_ANGLES
+    ]
+    return _build_from_pairs("delta", P, legs, half_width)
 
 
 def quattro_rigid(
@@ -138,8 +154,11 @@ def quattro_rigid(
     distance and the zero configuration are free choices. Parameters as in :func:`delta`.
     """
     P = np.asarray(home, dtype=float)
-    legs = [_on_arm(a, base_radius, P + polar(platform_radius, a), proximal, distal) for a in QUATTRO_ANGLES]
-    return _of_pairs("quattro_rigid", P, legs, half_width)
+    legs = [
+        _make_arm_leg(a, base_radius, P + compute_polar_point(platform_radius, a), proximal, distal)
+        for a in QUATTRO_ANGLES
+    ]
+    return _build_from_pairs("quattro_rigid", P, legs, half_width)
 
 
 def quattro(
@@ -183,7 +202,9 @@ def quattro(
     E1, E4 = D1 - [side_bar_offset, 0, 0], D2 - [side_bar_offset, 0, 0]
     b = Builder("quattro")
     b.link("base")
-    legs = [_on_arm(angle, base_radius, C, proximal, distal) for angle, C in zip(QUATTRO_ANGLES, tips, strict=True)]
+    legs = [
+        _make_arm_leg(angle, base_radius, C, proximal, distal) for angle, C in zip(QUATTRO_ANGLES, tips, strict=True)
+    ]
     _add_pairs(b, legs, half_width, ["plate_12", "plate_12", "plate_34", "plate_34"])
     for name, origin in (("plate_12", D1), ("platform", P), ("plate_34", D2), ("side_bar", E1)):
         b.link(name, at=origin)
@@ -216,10 +237,10 @@ def orthoglide(
     """
     P, axes = np.asarray(home, dtype=float), np.eye(3)
     legs = [
-        _on_rail(np.zeros(3), axis, P + platform_radius * axis, distal, side)
+        _make_rail_leg(np.zeros(3), axis, P + platform_radius * axis, distal, side)
         for axis, side in zip(axes, np.roll(axes, -1, axis=0), strict=True)
     ]
-    return _of_pairs("orthoglide", P, legs, half_width)
+    return _build_from_pairs("orthoglide", P, legs, half_width)
 
 
 def linear_delta(
@@ -237,8 +258,11 @@ def linear_delta(
     Other parameters as in :func:`delta`.
     """
     P = np.asarray(home, dtype=float)
-    legs = [_on_inclined_rail(a, base_radius, slope, P + polar(platform_radius, a), distal) for a in THREE_ANGLES]
-    return _of_pairs("linear_delta", P, legs, half_width)
+    legs = [
+        _make_inclined_rail_leg(a, base_radius, slope, P + compute_polar_point(platform_radius, a), distal)
+        for a in THREE_ANGLES
+    ]
+    return _build_from_pairs("linear_delta", P, legs, half_width)
 
 
 def uranesx(
@@ -255,8 +279,17 @@ def uranesx(
     stand on a circle of ``base_radius``.
     """
     P = np.asarray(home, dtype=float)
-    legs = [_on_rail(polar(base_radius, a), Z, P + polar(platform_radius, a), distal, tangent(a)) for a in THREE_ANGLES]
-    return _of_pairs("uranesx", P, legs, half_width)
+    legs = [
+        _make_rail_leg(
+            compute_polar_point(base_radius, a),
+            Z,
+            P + compute_polar_point(platform_radius, a),
+            distal,
+            compute_tangent(a),
+        )
+        for a in THREE_ANGLES
+    ]
+    return _build_from_pairs("uranesx", P, legs, half_width)
 
 
 def i4l(
@@ -288,12 +321,12 @@ def i4l(
     """
     P, x = np.asarray(home, dtype=float), np.array([1.0, 0, 0])
     legs = [
-        _on_rail(
+        _make_rail_leg(
             np.array([0, sy * rail_distance, 0]),
             x,
             P + [sx * plate_x, sy * plate_y, 0],
             distal,
-            tangent(math.atan2(sy, sx)),
+            compute_tangent(math.atan2(sy, sx)),
             forward=sx > 0,
         )
         for sx, sy in ((-1, -1), (-1, 1), (1, 1), (1, -1))
@@ -321,8 +354,11 @@ def three_ruu(
     the two inner axes are parallel to each other. Parameters as in :func:`delta`.
     """
     P = np.asarray(home, dtype=float)
-    legs = [_on_arm(a, base_radius, P + polar(platform_radius, a), proximal, distal) for a in THREE_ANGLES]
-    return _of_rods("3ruu", P, legs, "U")
+    legs = [
+        _make_arm_leg(a, base_radius, P + compute_polar_point(platform_radius, a), proximal, distal)
+        for a in THREE_ANGLES
+    ]
+    return _build_from_rods("3ruu", P, legs, "U")
 
 
 def three_puu(
@@ -339,8 +375,11 @@ def three_puu(
     are the two inner axes. Parameters as in :func:`linear_delta`.
     """
     P = np.asarray(home, dtype=float)
-    legs = [_on_inclined_rail(a, base_radius, slope, P + polar(platform_radius, a), distal) for a in THREE_ANGLES]
-    return _of_rods("3puu", P, legs, "U")
+    legs = [
+        _make_inclined_rail_leg(a, base_radius, slope, P + compute_polar_point(platform_radius, a), distal)
+        for a in THREE_ANGLES
+    ]
+    return _build_from_rods("3puu", P, legs, "U")
 
 
 def hexa(
@@ -368,9 +407,12 @@ def hexa(
         As in :func:`delta`.
     """
     P = np.asarray(home, dtype=float)
-    tips = six_tips(P, rotation_about(Z, twist), platform_radius, platform_half)
-    legs = [_on_arm(a, base_radius, C, proximal, distal) for a, C in zip(six_angles(base_half), tips, strict=True)]
-    return _of_rods("hexa", P, legs, "S")
+    tips = locate_six_tips(P, rotate_about_axis(Z, twist), platform_radius, platform_half)
+    legs = [
+        _make_arm_leg(a, base_radius, C, proximal, distal)
+        for a, C in zip(list_six_angles(base_half), tips, strict=True)
+    ]
+    return _build_from_rods("hexa", P, legs, "S")
 
 
 def hexaglide(
@@ -397,9 +439,11 @@ def hexaglide(
         As in :func:`hexa`.
     """
     P, (x, y, _) = np.asarray(home, dtype=float), np.eye(3)
-    tips = six_tips(P, rotation_about(Z, twist), platform_radius, platform_half)
-    legs = [_on_rail(rail * y, x, C, distal, y, forward) for rail, forward, C in zip(rails, ahead, tips, strict=True)]
-    return _of_rods("hexaglide", P, legs, "S")
+    tips = locate_six_tips(P, rotate_about_axis(Z, twist), platform_radius, platform_half)
+    legs = [
+        _make_rail_leg(rail * y, x, C, distal, y, forward) for rail, forward, C in zip(rails, ahead, tips, strict=True)
+    ]
+    return _build_from_rods("hexaglide", P, legs, "S")
 
 
 def six_pus(
@@ -419,8 +463,9 @@ def six_pus(
     U is tangential. Other parameters as in :func:`hexa`.
     """
     P = np.asarray(home, dtype=float)
-    tips = six_tips(P, rotation_about(Z, twist), platform_radius, platform_half)
+    tips = locate_six_tips(P, rotate_about_axis(Z, twist), platform_radius, platform_half)
     legs = [
-        _on_inclined_rail(a, base_radius, slope, C, distal) for a, C in zip(six_angles(base_half), tips, strict=True)
+        _make_inclined_rail_leg(a, base_radius, slope, C, distal)
+        for a, C in zip(list_six_angles(base_half), tips, strict=True)
     ]
-    return _of_rods("6pus", P, legs, "S")
+    return _build_from_rods("6pus", P, legs, "S")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import BadRequest
-from ..geometry.vectors import Array, frozen
+from ..geometry.vectors import Array, freeze_array
 from ..mechanism.builder import Builder
 from ..mechanism.cameras import NamedCamera
 from ..mechanism.model import Mechanism
@@ -22,7 +22,7 @@ MOVES = {"free": "6", "yaw": "xyzR", "position": "xyz", "plane": "xyR", "plane p
 about its z axis, or a free joint."""
 
 
-def formation(
+def build_formation(
     places: Sequence[ArrayLike],
     bearings: Iterable[tuple[int, int]] = (),
     distances: Iterable[tuple[int, int]] = (),
@@ -61,6 +61,6 @@ def formation(
         for i, j in pairs:
             if i == j or not {i, j} <= cameras.keys():
                 raise BadRequest("a pair of bodies", (i, j), f"two of 1 to {count}")
-            seen.append(kind(f"{mark}{i}-{j}", f"b{j}", at=frozen(np.zeros(3)), camera=cameras[i]))
+            seen.append(kind(f"{mark}{i}-{j}", f"b{j}", at=freeze_array(np.zeros(3)), camera=cameras[i]))
     made = builder.build(platform="b1")
     return replace(made, observations=tuple(seen), cameras=tuple(cameras.values()), formation=True)

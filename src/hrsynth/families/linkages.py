@@ -13,12 +13,12 @@ from itertools import accumulate
 
 import numpy as np
 
-from ..budgets import LINKAGE_STARTS
+from ..budgets import LINKAGE_STARTS_COUNT
 from ..errors import BadRequest
 from ..geometry.vectors import Array
 from ..mechanism.builder import Builder
 from ..mechanism.model import Mechanism
-from ..tolerances import RANK_CUTOFF, SOLVED, STANDING
+from ..tolerances import CLOSURE_SOLVER_TOL, LEAST_SQUARES_DECREASE_TOL, RANK_CUTOFF_FRACTION
 
 RIGHT = math.pi / 2
 
@@ -63,10 +63,10 @@ class Linkage:
             lambda x: (self.frames(angles(x))[-1] - np.eye(4))[:3].ravel(),
             start if second is None else np.delete(start, 1),
             xtol=1e-15,
-            ftol=STANDING,
+            ftol=LEAST_SQUARES_DECREASE_TOL,
             gtol=1e-15,
         )
-        return angles(end.x) if np.abs(end.fun).max() < SOLVED else None
+        return angles(end.x) if np.abs(end.fun).max() < CLOSURE_SOLVER_TOL else None
 
     def regular(self, rng: np.random.Generator) -> Array:
         """Closed angles (n,) at which it can move, in one way, away from special configurations: the first that are
@@ -77,7 +77,9 @@ class Linkage:
         count = len(self.lengths)
         best, most = None, 0.0
         spans = np.hypot(self.lengths, self.offsets)
-        for _ in range(LINKAGE_STARTS if 2 * spans.max() <= spans.sum() else 0):  # no link is longer than the others
+        for _ in range(
+            LINKAGE_STARTS_COUNT if 2 * spans.max() <= spans.sum() else 0
+        ):  # no link is longer than the others
             start = rng.uniform(-math.pi, math.pi, count)
             found = self.close(start, start[1])  # the second angle held: the same closure on every machine
             if found is None:
@@ -85,7 +87,7 @@ class Linkage:
             found = np.remainder(found + math.pi, 2 * math.pi) - math.pi
             *_, weakest, lost = np.linalg.svd(self.axes(found), compute_uv=False)
             away = min(weakest / (0.05 * self.lengths.max()), np.abs(np.sin(found)).min() / 0.1)
-            if lost < RANK_CUTOFF and away > most:
+            if lost < RANK_CUTOFF_FRACTION and away > most:
                 best, most = found, away
                 if away > 1:
                     break

@@ -13,13 +13,15 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..geometry.vectors import Array, rotation_about, unit
+from ..geometry.vectors import Array, normalise_vector, rotate_about_axis
 from ..mechanism.builder import Builder
 from ..mechanism.model import Mechanism
-from .geometry import THREE_ANGLES, Z, polar, six_angles, six_tips, tangent, wrist
+from .geometry import THREE_ANGLES, Z, add_wrist, compute_polar_point, compute_tangent, list_six_angles, locate_six_tips
 
 
-def _n_pod(name: str, home: ArrayLike, base: str, end: str, legs: Iterable[tuple[Array, Array, Array]]) -> Mechanism:
+def _build_n_pod(
+    name: str, home: ArrayLike, base: str, end: str, legs: Iterable[tuple[Array, Array, Array]]
+) -> Mechanism:
     """Legs from A_i to B_i: ``base`` joint U or R, actuated P, ``end`` joint S or U; ``legs`` are A_i, B_i and the
     (first) axis of the base joint."""
     b = Builder(name)
@@ -29,15 +31,18 @@ def _n_pod(name: str, home: ArrayLike, base: str, end: str, legs: Iterable[tuple
         b.link(cylinder, at=A)
         b.link(rod, at=(A + B) / 2)
         b.joint(f"shoulder_{leg}", base, "base", cylinder, at=A, axis=first, axis2=second if base == "U" else None)
-        b.joint(f"slide_{leg}", "P", cylinder, rod, at=(A + B) / 2, axis=unit(B - A), motor=f"motor_{leg}")
-        wrist(b, leg, end, B, second, first)
+        b.joint(f"slide_{leg}", "P", cylinder, rod, at=(A + B) / 2, axis=normalise_vector(B - A), motor=f"motor_{leg}")
+        add_wrist(b, leg, end, B, second, first)
     b.link("platform", at=home)
     return b.build(platform="platform")
 
 
-def _three(base_radius: float, platform_radius: float, P: Array) -> list[tuple[Array, Array, Array]]:
+def _place_three_legs(base_radius: float, platform_radius: float, P: Array) -> list[tuple[Array, Array, Array]]:
     """Three such legs a third of a turn apart, their first axes tangential."""
-    return [(polar(base_radius, a), P + polar(platform_radius, a), tangent(a)) for a in THREE_ANGLES]
+    return [
+        (compute_polar_point(base_radius, a), P + compute_polar_point(platform_radius, a), compute_tangent(a))
+        for a in THREE_ANGLES
+    ]
 
 
 def gough_stewart(
@@ -67,9 +72,14 @@ def gough_stewart(
         The platform's rotation about z, then about x, at the zero configuration (rad).
     """
     P = np.asarray(home, dtype=float)
-    tips = six_tips(P, rotation_about((1, 0, 0), tilt) @ rotation_about(Z, twist), platform_radius, platform_half)
-    legs = [(polar(base_radius, a), B, tangent(a)) for a, B in zip(six_angles(base_half), tips, strict=True)]
-    return _n_pod("gough_stewart", P, "U", "S", legs)
+    tips = locate_six_tips(
+        P, rotate_about_axis((1, 0, 0), tilt) @ rotate_about_axis(Z, twist), platform_radius, platform_half
+    )
+    legs = [
+        (compute_polar_point(base_radius, a), B, compute_tangent(a))
+        for a, B in zip(list_six_angles(base_half), tips, strict=True)
+    ]
+    return _build_n_pod("gough_stewart", P, "U", "S", legs)
 
 
 def three_upu(
@@ -81,7 +91,7 @@ def three_upu(
     are the two inner ones, normal to the leg. Parameters as in :func:`gough_stewart`.
     """
     P = np.asarray(home, dtype=float)
-    return _n_pod("3upu", P, "U", "U", _three(base_radius, platform_radius, P))
+    return _build_n_pod("3upu", P, "U", "U", _place_three_legs(base_radius, platform_radius, P))
 
 
 def three_rps(*, base_radius: float = 0.4, platform_radius: float = 0.15, height: float = 0.3) -> Mechanism:
@@ -92,4 +102,4 @@ def three_rps(*, base_radius: float = 0.4, platform_radius: float = 0.15, height
     ``height``: of P, above the base's origin, at the zero configuration. Other parameters as in :func:`gough_stewart`.
     """
     P = np.array([0.0, 0.0, height])
-    return _n_pod("3rps", P, "R", "S", _three(base_radius, platform_radius, P))
+    return _build_n_pod("3rps", P, "R", "S", _place_three_legs(base_radius, platform_radius, P))

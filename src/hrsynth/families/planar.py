@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import BadRequest
-from ..geometry.vectors import Array, unit
+from ..geometry.vectors import Array, normalise_vector
 from ..mechanism.builder import Builder
 from ..mechanism.model import Mechanism
-from .geometry import Z, on_circle, on_line, polar, radial
+from .geometry import Z, compute_polar_point, compute_radial, locate_on_circle, locate_on_line
 
 Pairs = Sequence[tuple[float, float]]
 Pose = tuple[float, float, float]
@@ -63,10 +63,10 @@ def _add(b: Builder, leg: int, types: str, geometry: _PlanarLeg, motor: int, fra
         )
 
 
-def _elbow(A: Array, C: Array, proximal: float, distal: float, left: bool) -> Array:
+def _locate_elbow(A: Array, C: Array, proximal: float, distal: float, left: bool) -> Array:
     """The elbow of two links from A to C, to the left or the right of AC; shape (3,)."""
-    side = np.cross(Z, unit(C - A)) * (1 if left else -1)
-    return on_circle(A, side, unit(C - A), proximal, C, distal, outward=True)
+    side = np.cross(Z, normalise_vector(C - A)) * (1 if left else -1)
+    return locate_on_circle(A, side, normalise_vector(C - A), proximal, C, distal, outward=True)
 
 
 # ---------------------------------------------------------------------------------------------------------- two dof
@@ -82,10 +82,10 @@ def _pair(name: str, types: str, legs: Sequence[_PlanarLeg], motor: int, point_b
     if not point_body:
         b.joint("end", "R", "dist_1", "dist_2", at=end, axis=Z, loop=True)
         return b.build(platform="dist_1")
-    return _with_platform(b, "R", legs, end)
+    return _add_platform(b, "R", legs, end)
 
 
-def _with_platform(b: Builder, kind: str, legs: Sequence[_PlanarLeg], home: ArrayLike) -> Mechanism:
+def _add_platform(b: Builder, kind: str, legs: Sequence[_PlanarLeg], home: ArrayLike) -> Mechanism:
     """The legs' last joints on a platform of its own, which hangs on the first leg."""
     b.link("platform", at=home)
     for number, leg in enumerate(legs, start=1):
@@ -101,7 +101,7 @@ def _with_platform(b: Builder, kind: str, legs: Sequence[_PlanarLeg], home: Arra
     return b.build(platform="platform")
 
 
-def _bases(distance: float) -> list[Array]:
+def _list_bases(distance: float) -> list[Array]:
     """The two base points, on the x axis."""
     return [np.array([sign * distance / 2, 0.0, 0.0]) for sign in (-1, 1)]
 
@@ -129,8 +129,8 @@ def rrrrr(
     """
     P = np.array([*home, 0.0])
     legs = [
-        _PlanarLeg((A, _elbow(A, P, proximal, distal, left=left), P))
-        for A, left in zip(_bases(base_distance), (True, False), strict=True)
+        _PlanarLeg((A, _locate_elbow(A, P, proximal, distal, left=left), P))
+        for A, left in zip(_list_bases(base_distance), (True, False), strict=True)
     ]
     return _pair(f"rrrrr_m{motor}", "RRR", legs, motor)
 
@@ -141,11 +141,11 @@ def rprpr(*, motor: int = 1, base_distance: float = 0.3, home: tuple[float, floa
     ``motor`` 1: R̲PRPR̲; 2: RP̲RP̲R. Other parameters as in :func:`rrrrr`.
     """
     P = np.array([*home, 0.0])
-    legs = [_PlanarLeg((A, (A + P) / 2, P), (Z, P - A, Z)) for A in _bases(base_distance)]
+    legs = [_PlanarLeg((A, (A + P) / 2, P), (Z, P - A, Z)) for A in _list_bases(base_distance)]
     return _pair(f"rprpr_m{motor}", "RPR", legs, motor)
 
 
-def _prrrp(
+def _build_prrrp(
     name: str,
     motor: int,
     base_distance: float,
@@ -156,9 +156,9 @@ def _prrrp(
 ) -> Mechanism:
     P = np.array([*home, 0.0])
     legs = []
-    for A, angle in zip(_bases(base_distance), rails, strict=True):
-        B = on_line(A, radial(angle), P, distal)
-        legs.append(_PlanarLeg((B, B, P), (radial(angle), Z, Z)))
+    for A, angle in zip(_list_bases(base_distance), rails, strict=True):
+        B = locate_on_line(A, compute_radial(angle), P, distal)
+        legs.append(_PlanarLeg((B, B, P), (compute_radial(angle), Z, Z)))
     return _pair(name, "PRR", legs, motor, point_body)
 
 
@@ -185,7 +185,7 @@ def prrrp(
     home
         The end joint at the zero configuration, x and y.
     """
-    return _prrrp(f"prrrp_m{motor}", motor, base_distance, rails, distal, home)
+    return _build_prrrp(f"prrrp_m{motor}", motor, base_distance, rails, distal, home)
 
 
 def prrrp_parallel(
@@ -201,28 +201,28 @@ def prrrp_parallel(
     instead of the last segment of leg 1. Other parameters as in :func:`prrrp`.
     """
     name = "prrrp_parallel_point" if point_body else "prrrp_parallel"
-    return _prrrp(name, 1, base_distance, (math.pi / 2, math.pi / 2), distal, home, point_body)
+    return _build_prrrp(name, 1, base_distance, (math.pi / 2, math.pi / 2), distal, home, point_body)
 
 
 # -------------------------------------------------------------------------------------------------------- three dof
 
 
-def _corners(base: Pairs, platform: Pairs, home: Pose) -> list[tuple[Array, Array]]:
+def _locate_corners(base: Pairs, platform: Pairs, home: Pose) -> list[tuple[Array, Array]]:
     """A_i and C_i of the three legs in the base frame at the zero configuration."""
     x, y, phi = home
     return [
-        (polar(*a), np.array([x, y, 0.0]) + polar(radius, angle + phi))
+        (compute_polar_point(*a), np.array([x, y, 0.0]) + compute_polar_point(radius, angle + phi))
         for a, (radius, angle) in zip(base, platform, strict=True)
     ]
 
 
-def _triple(name: str, types: str, legs: Sequence[_PlanarLeg], motor: int, home: Pose) -> Mechanism:
+def _build_triple(name: str, types: str, legs: Sequence[_PlanarLeg], motor: int, home: Pose) -> Mechanism:
     """Three planar legs and a rigid platform; the platform frame has the axes of the base at the zero configuration."""
     b = Builder(name)
     b.link("base")
     for number, geometry in enumerate(legs, start=1):
         _add(b, number, types, geometry, motor)
-    return _with_platform(b, types[2], legs, (home[0], home[1], 0.0))
+    return _add_platform(b, types[2], legs, (home[0], home[1], 0.0))
 
 
 def three_rrr(
@@ -247,8 +247,11 @@ def three_rrr(
     home
         Platform pose x, y, φ at the zero configuration.
     """
-    legs = [_PlanarLeg((A, _elbow(A, C, proximal, distal, left=True), C)) for A, C in _corners(base, platform, home)]
-    return _triple(f"3rrr_m{motor}", "RRR", legs, motor, home)
+    legs = [
+        _PlanarLeg((A, _locate_elbow(A, C, proximal, distal, left=True), C))
+        for A, C in _locate_corners(base, platform, home)
+    ]
+    return _build_triple(f"3rrr_m{motor}", "RRR", legs, motor, home)
 
 
 def six_poses(
@@ -278,10 +281,10 @@ def six_poses(
     turn = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
     tips = [np.array([-0.148961281, 0.0158296166, 0]) + turn @ corner for corner in corners]
     centres = [np.array(centre) for centre in ((0, 0, 0), (0.1591, 0, 0), (0, 0.1, 0))]
-    held = [rod * radial(angle) for rod, angle in zip(rods, directions, strict=True)]
+    held = [rod * compute_radial(angle) for rod, angle in zip(rods, directions, strict=True)]
     legs = [_PlanarLeg((centre - rod, tip - rod, tip)) for centre, rod, tip in zip(centres, held, tips, strict=True)]
     x, y, _ = np.mean(tips, axis=0)
-    return _triple("six_poses", "RRR", legs, motor, (float(x), float(y), 0.0))
+    return _build_triple("six_poses", "RRR", legs, motor, (float(x), float(y), 0.0))
 
 
 def three_rpr(*, motor: int = 1, base: Pairs = BASE, platform: Pairs = PLATFORM, home: Pose = HOME) -> Mechanism:
@@ -289,8 +292,8 @@ def three_rpr(*, motor: int = 1, base: Pairs = BASE, platform: Pairs = PLATFORM,
 
     ``motor`` 1: 3-R̲PR; 2: 3-RP̲R. Other parameters as in :func:`three_rrr`.
     """
-    legs = [_PlanarLeg((A, (A + C) / 2, C), (Z, C - A, Z)) for A, C in _corners(base, platform, home)]
-    return _triple(f"3rpr_m{motor}", "RPR", legs, motor, home)
+    legs = [_PlanarLeg((A, (A + C) / 2, C), (Z, C - A, Z)) for A, C in _locate_corners(base, platform, home)]
+    return _build_triple(f"3rpr_m{motor}", "RPR", legs, motor, home)
 
 
 def three_prr(
@@ -316,17 +319,17 @@ def three_prr(
         As in :func:`three_rrr`.
     """
     legs = []
-    for (_, angle), (A, C) in zip(base, _corners(base, platform, home), strict=True):
-        direction = radial(angle + rail)
-        B = on_line(A, direction, C, distal, forward=True)
+    for (_, angle), (A, C) in zip(base, _locate_corners(base, platform, home), strict=True):
+        direction = compute_radial(angle + rail)
+        B = locate_on_line(A, direction, C, distal, forward=True)
         legs.append(_PlanarLeg((B, B, C), (direction, Z, Z)))
-    return _triple(f"3prr_m{motor}", "PRR", legs, motor, home)
+    return _build_triple(f"3prr_m{motor}", "PRR", legs, motor, home)
 
 
-def _slots(platform: Pairs, home: Pose, reach: float, slot: float) -> Iterator[tuple[float, Array, Array, Array]]:
+def _place_slots(platform: Pairs, home: Pose, reach: float, slot: float) -> Iterator[tuple[float, Array, Array, Array]]:
     """For a P on the platform: the angle of C_i's radius, the joint B_i before it, C_i, the P's direction from C_i."""
-    for (_, angle), (_, C) in zip(platform, _corners(BASE, platform, home), strict=True):
-        along = radial(angle + home[2] + slot)
+    for (_, angle), (_, C) in zip(platform, _locate_corners(BASE, platform, home), strict=True):
+        along = compute_radial(angle + home[2] + slot)
         yield angle + home[2], C + reach * along, C, along
 
 
@@ -350,10 +353,10 @@ def three_prp(
         As in :func:`three_rrr`.
     """
     legs = [
-        _PlanarLeg((B, B, C), (radial(angle + rail), Z, -along))
-        for angle, B, C, along in _slots(platform, home, reach, slot)
+        _PlanarLeg((B, B, C), (compute_radial(angle + rail), Z, -along))
+        for angle, B, C, along in _place_slots(platform, home, reach, slot)
     ]
-    return _triple("3prp", "PRP", legs, 1, home)
+    return _build_triple("3prp", "PRP", legs, 1, home)
 
 
 def three_rrp(
@@ -377,10 +380,10 @@ def three_rrp(
         As in :func:`three_prp`.
     """
     legs = [
-        _PlanarLeg((B + proximal * radial(angle + bend), B, C), (Z, Z, -along))
-        for angle, B, C, along in _slots(platform, home, reach, slot)
+        _PlanarLeg((B + proximal * compute_radial(angle + bend), B, C), (Z, Z, -along))
+        for angle, B, C, along in _place_slots(platform, home, reach, slot)
     ]
-    return _triple("3rrp", "RRP", legs, 1, home)
+    return _build_triple("3rrp", "RRP", legs, 1, home)
 
 
 def three_ppr(
@@ -404,9 +407,9 @@ def three_ppr(
         As in :func:`three_rrr`.
     """
     legs = []
-    for (_, angle), (A, C) in zip(base, _corners(base, platform, home), strict=True):
-        d, e = radial(angle + first), radial(angle + second)
+    for (_, angle), (A, C) in zip(base, _locate_corners(base, platform, home), strict=True):
+        d, e = compute_radial(angle + first), compute_radial(angle + second)
         travel = np.linalg.solve(np.column_stack([d[:2], e[:2]]), (C - A)[:2])
         B = A + travel[0] * d
         legs.append(_PlanarLeg((B, B, C), (d, e, Z)))
-    return _triple(f"3ppr_m{motor}", "PPR", legs, motor, home)
+    return _build_triple(f"3ppr_m{motor}", "PPR", legs, motor, home)

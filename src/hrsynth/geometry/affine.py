@@ -23,7 +23,7 @@ from .vectors import Array, cross
 Numbers = TypeVar("Numbers", Array, Any)
 HALF_PI = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624871116645580e-21)
 """π/2 as a sum: the first two have 33 bits each, so that products with whole numbers below 2²⁰ are exact."""
-FARTHEST_TURN = 1e6
+EXACT_SINE_ANGLE_MAX_RAD = 1e6
 """Angles above which sines come from balls: whole quarters of a turn are below 2²⁰ up to here."""
 SINE_SERIES = tuple((-1.0) ** k / math.factorial(2 * k + 1) for k in range(9))
 COSINE_SERIES = tuple((-1.0) ** k / math.factorial(2 * k) for k in range(10))
@@ -76,13 +76,15 @@ class AffineForms:
         if not isinstance(other, AffineForms):
             k = np.asarray(other)
             size = np.abs(self.v).sum(axis=0)
-            return _add_rounding(self.v * k, self.r * np.abs(k) + _doubt(k) * (size + self.r), size * np.abs(k))
+            return _add_rounding(
+                self.v * k, self.r * np.abs(k) + _bound_input_error(k) * (size + self.r), size * np.abs(k)
+            )
         a, b = self.v, other.v
         v, both = a * b[0] + b * a[0], a[1:] * b[1:]
         # ε_k² is ½ ± ½, other products of two symbols are 0 ± 1
         v[0] = a[0] * b[0] + 0.5 * both.sum(axis=0)
         slopes_a, slopes_b, shared = (np.abs(each).sum(axis=0) for each in (a[1:], b[1:], both))
-        return AffineForms(v, product_radius(a[0], slopes_a, self.r, b[0], slopes_b, other.r, shared))
+        return AffineForms(v, bound_product(a[0], slopes_a, self.r, b[0], slopes_b, other.r, shared))
 
     __rmul__ = __mul__
 
@@ -98,7 +100,7 @@ class AffineForms:
 
     def scaled(self, factor: float, doubt: float) -> AffineForms:
         """The values times a number that is known to ``doubt``."""
-        return AffineForms(self.v * factor, scaled_radius(np.abs(self.v).sum(axis=0), self.r, factor, doubt))
+        return AffineForms(self.v * factor, bound_scaled(np.abs(self.v).sum(axis=0), self.r, factor, doubt))
 
     def shifted(self, term: float, doubt: float) -> AffineForms:
         """The values and a number that is known to ``doubt``."""
@@ -109,18 +111,18 @@ class AffineForms:
     def inverse(self) -> AffineForms:
         """1 / value; not finite where the values may vanish."""
         with np.errstate(all="ignore"):
-            return self._along(*inverse_line(self.v[0], self.spread))
+            return self._along(*bound_inverse(self.v[0], self.spread))
 
     def sqrt(self) -> AffineForms:
         """√value for those values that are not negative; no number where all are negative."""
         with np.errstate(all="ignore"):
-            return self._along(*root_line(self.v[0], self.spread))
+            return self._along(*bound_root(self.v[0], self.spread))
 
     def _along(self, slope: Array, shift: Array, off: Array, size: Array) -> AffineForms:
         """slope · values + shift ± off, for results of a ``size``."""
         v = self.v * slope
         v[0] += shift
-        return AffineForms(v, line_radius(self.r, slope, off, size, np.abs(v).sum(axis=0)))
+        return AffineForms(v, bound_line(self.r, slope, off, size, np.abs(v).sum(axis=0)))
 
     def padded(self, count: int) -> AffineForms:
         """Return the forms with more symbols, on which they do not depend."""
@@ -136,11 +138,11 @@ class AffineForms:
 
     def sines(self) -> tuple[AffineForms, AffineForms]:
         """Sine and cosine."""
-        sine, cosine = sines(self.v[0])
+        sine, cosine = enclose_sines(self.v[0])
         w, found = self.spread, []
         for value, rate in ((sine, cosine), (cosine, -sine)):
             v = self.v * rate
-            v[0], along, r = sine_line(value, rate, self.r, w, self.bend is not None)
+            v[0], along, r = bound_sine(value, rate, self.r, w, self.bend is not None)
             if self.bend is not None:
                 v[self.bend] += along
             found.append(AffineForms(v, r))
@@ -154,10 +156,10 @@ class AffineForms:
         k = k.reshape((1,) * (self.r.ndim - k.ndim) + k.shape)
         v = np.zeros((len(self.v), *k.shape))
         v[0] = k
-        return AffineForms(v, np.zeros(k.shape) if isinstance(other, int | float) else _doubt(k))
+        return AffineForms(v, np.zeros(k.shape) if isinstance(other, int | float) else _bound_input_error(k))
 
 
-def affine(centre: Array, slopes: Array, radius: Array, bend: int | None = None) -> AffineForms:
+def make_affine(centre: Array, slopes: Array, radius: Array, bend: int | None = None) -> AffineForms:
     """Forms of floats that are exact: centres (…), slopes (…, n), radii (…)."""
     # symbols first in memory too: sums over them then have one order
     return AffineForms(np.ascontiguousarray(np.concatenate([centre[None], np.moveaxis(slopes, -1, 0)])), radius, bend)
@@ -175,7 +177,7 @@ def stack(parts: Sequence[Any], axis: int = -1) -> Any:
     )
 
 
-def cross_product(a: Any, b: Any) -> Any:
+def compute_cross_forms(a: Any, b: Any) -> Any:
     """a × b along the last dimension."""
     if not isinstance(a, AffineForms) and not isinstance(b, AffineForms):
         return cross(a, b)
@@ -183,7 +185,7 @@ def cross_product(a: Any, b: Any) -> Any:
     return stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
 
 
-def dot_product(a: Any, b: Any) -> Any:
+def compute_dot_forms(a: Any, b: Any) -> Any:
     """a · b along the last dimension."""
     return (a * b).sum(-1)
 
@@ -199,16 +201,16 @@ def combine(Y: Array, forms: AffineForms) -> AffineForms:
 
 def _add_rounding(v: Array, r: Array, size: Array) -> AffineForms:
     """Forms with the rounding of numbers of a ``size`` added to their radius."""
-    return AffineForms(v, rounded_radius(r, size))
+    return AffineForms(v, round_radius(r, size))
 
 
-def _doubt(k: Array) -> Array:
+def _bound_input_error(k: Array) -> Array:
     """Error of a geometry's numbers."""
     size = np.abs(k)
     return np.where((size == 0) | (size == 1), 0.0, CHAIN_ROUNDING * (1 + size))
 
 
-def rounded_radius(r: Numbers, size: Numbers) -> Numbers:
+def round_radius(r: Numbers, size: Numbers) -> Numbers:
     """A radius with the rounding of numbers of a ``size``."""
     return (r + AFFINE_ROUNDING * size) * (1 + AFFINE_ROUNDING)
 
@@ -218,22 +220,22 @@ def spread(slopes: Numbers, r: Numbers) -> Numbers:
     return (slopes + r) * (1 + AFFINE_ROUNDING)
 
 
-def product_radius(
+def bound_product(
     a: Numbers, slopes_a: Numbers, r_a: Numbers, b: Numbers, slopes_b: Numbers, r_b: Numbers, both: Numbers
 ) -> Numbers:
     """The radius of a product: of centres, sums of slopes' sizes, radii, and the sum of the sizes of products of slopes
     of the same symbol, half of which is in the centre."""
     size_a, size_b = abs(a) + slopes_a, abs(b) + slopes_b
-    return rounded_radius(size_a * r_b + size_b * r_a + r_a * r_b + slopes_a * slopes_b - 0.5 * both, size_a * size_b)
+    return round_radius(size_a * r_b + size_b * r_a + r_a * r_b + slopes_a * slopes_b - 0.5 * both, size_a * size_b)
 
 
-def scaled_radius(size: Numbers, r: Numbers, factor: float, doubt: float) -> Numbers:
+def bound_scaled(size: Numbers, r: Numbers, factor: float, doubt: float) -> Numbers:
     """The radius of values, the sum of whose centre's and slopes' sizes is ``size``, times a number known to
     ``doubt``."""
-    return rounded_radius(r * abs(factor) + doubt * (size + r), size * abs(factor))
+    return round_radius(r * abs(factor) + doubt * (size + r), size * abs(factor))
 
 
-def inverse_line(centre: Numbers, width: Numbers) -> tuple[Numbers, Numbers, Numbers, Numbers]:
+def bound_inverse(centre: Numbers, width: Numbers) -> tuple[Numbers, Numbers, Numbers, Numbers]:
     """Slope, shift, error and size of a line near 1 / value: on [a, b], a > 0, it lies between its secant and the
     tangent of the same slope −1 / (a b). No numbers where the values may vanish."""
     sign, middle = np.sign(centre), abs(centre)
@@ -243,7 +245,7 @@ def inverse_line(centre: Numbers, width: Numbers) -> tuple[Numbers, Numbers, Num
     return -1 / (a * b), sign * (top + least) / 2, abs(top - least) / 2, top
 
 
-def root_line(centre: Numbers, width: Numbers) -> tuple[Numbers, Numbers, Numbers, Numbers]:
+def bound_root(centre: Numbers, width: Numbers) -> tuple[Numbers, Numbers, Numbers, Numbers]:
     """Return slope, shift, error and size of a line near √value, of those values that are not negative: on [a, b] it is
     between its secant and the tangent of the same slope 1 / (√a + √b). No numbers where all are negative."""
     off = AFFINE_ROUNDING * abs(centre)
@@ -253,21 +255,21 @@ def root_line(centre: Numbers, width: Numbers) -> tuple[Numbers, Numbers, Number
     return 1 / both, (top + least) / 2, (top - least) / 2, both
 
 
-def line_radius(r: Numbers, slope: Numbers, off: Numbers, size: Numbers, found: Numbers) -> Numbers:
+def bound_line(r: Numbers, slope: Numbers, off: Numbers, size: Numbers, found: Numbers) -> Numbers:
     """The radius of slope · values + shift ± off, for results of a ``size``, and ``found`` of centre and slopes."""
-    return rounded_radius(r * abs(slope) + off, 4 * (size + found))
+    return round_radius(r * abs(slope) + off, 4 * (size + found))
 
 
-def sine_line(value: Numbers, rate: Numbers, r: Numbers, w: Numbers, bent: bool) -> tuple[Numbers, Numbers, Numbers]:
+def bound_sine(value: Numbers, rate: Numbers, r: Numbers, w: Numbers, bent: bool) -> tuple[Numbers, Numbers, Numbers]:
     """Centre, what is along the symbol of the bend if it has one, and radius of a sine with a ``rate`` at the centre:
     with d = s · ε ± r and |d| ≤ w, cos d is 1 − w²/4 + ε w²/4 for some ε, and sin d is d ± w³/6."""
     bend = w * w / 4
     along = value * bend
     r = abs(rate) * (r + w * w * w / 6)
-    return value * (1 - bend), along, rounded_radius((r if bent else r + abs(along)) + AFFINE_ROUNDING, 1 + w)
+    return value * (1 - bend), along, round_radius((r if bent else r + abs(along)) + AFFINE_ROUNDING, 1 + w)
 
 
-def turned_sines(x: Numbers) -> tuple[Numbers, Numbers]:
+def reduce_sines(x: Numbers) -> tuple[Numbers, Numbers]:
     """Sine and cosine of angles up to ``FARTHEST_TURN``, each within 2⁻⁵⁰: the angle less whole quarters k of a turn,
     the first part of π/2 exactly and each of the others with one rounding (2⁻⁵⁴), then Taylor's series, which are off
     by 10⁻¹⁹, with a dozen roundings of numbers below 1 of which the last three count (W. J. Cody, W. Waite, Software
@@ -287,11 +289,11 @@ def turned_sines(x: Numbers) -> tuple[Numbers, Numbers]:
     )
 
 
-def sines(x: Array) -> tuple[Array, Array]:
+def enclose_sines(x: Array) -> tuple[Array, Array]:
     """Sines and cosines of floats, each within 2⁻⁵⁰."""
     with np.errstate(invalid="ignore"):
-        sine, cosine = turned_sines(x)
-    far = np.abs(x) > FARTHEST_TURN
+        sine, cosine = reduce_sines(x)
+    far = np.abs(x) > EXACT_SINE_ANGLE_MAX_RAD
     if np.any(far):
         from flint import arb
 

@@ -17,12 +17,12 @@ Field = NDArray[Any]
 """Floats, or objects that are balls."""
 
 
-def unit_balls(v: Field) -> Field:
+def normalise_balls(v: Field) -> Field:
     """v / |v| along the last axis."""
     return np.asarray(v / np.sqrt(dot(v, v))[..., None])
 
 
-def balls(low: Sequence[float] | Array, high: Sequence[float] | Array) -> Field:
+def enclose_intervals(low: Sequence[float] | Array, high: Sequence[float] | Array) -> Field:
     """Balls that enclose the intervals from ``low`` to ``high``, (n,)."""
     from flint import arb
 
@@ -31,14 +31,14 @@ def balls(low: Sequence[float] | Array, high: Sequence[float] | Array) -> Field:
     )
 
 
-def around(x: Array, radius: float) -> Field:
+def enclose_around(x: Array, radius: float) -> Field:
     """Balls of a radius around numbers, in the same shape."""
     from flint import arb
 
     return np.array([arb(float(v), radius) for v in np.ravel(x)], dtype=object).reshape(np.shape(x))
 
 
-def jets(boxes: Field) -> Field:
+def make_ball_jets(boxes: Field) -> Field:
     """Balls as variables: a formula on them gives its value and, by Taylor's first order, its derivative."""
     from flint import arb_series
 
@@ -48,7 +48,7 @@ def jets(boxes: Field) -> Field:
     return found
 
 
-def mean_value_form(middle: Field, jet: Field, reach: Field) -> Field:
+def evaluate_mean_value_form(middle: Field, jet: Field, reach: Field) -> Field:
     """Mean value form: f(m) + f'(X) (X − m) encloses f on the balls X, for f at the middles m, jets of f, and X − m."""
     slopes = np.array([x[1] for x in jet.flat], dtype=object).reshape(jet.shape)
     return np.asarray(middle + (slopes.T * reach).T)
@@ -63,19 +63,19 @@ def widen(v: Field, radius: float) -> Field:
     return np.asarray(v + arb(0, radius))
 
 
-def above_zero(v: Field) -> NDArray[np.bool_]:
+def check_positive(v: Field) -> NDArray[np.bool_]:
     """Return True where a number, or every number in a ball, is positive (never where it is not a number)."""
     if v.dtype != object:
         return np.asarray(v > 0)
     return np.array([bool(x > 0) for x in v.flat], dtype=bool).reshape(v.shape)
 
 
-def finite(v: Field) -> NDArray[np.bool_]:
+def check_finite(v: Field) -> NDArray[np.bool_]:
     """Return True where a ball is bounded (formulas on it had no pole in it)."""
     return np.array([getattr(x, "is_finite", lambda: True)() for x in v], dtype=bool)
 
 
-def below(v: Field) -> Array:
+def bound_norm_below(v: Field) -> Array:
     """A lower bound of |v|, (n,): 0 where a ball holds zero or is no number."""
     if v.dtype != object:
         return np.abs(v)

@@ -70,7 +70,7 @@ def normalise(a: Components) -> list[Any]:
     return [x / size for x in a]
 
 
-def combination(x: Components, ways: NDArray[Any], number: Callable[[Any], Any]) -> Components:
+def combine_columns(x: Components, ways: NDArray[Any], number: Callable[[Any], Any]) -> Components:
     """Σ x_i w_i of the columns w_i of ``ways``, which ``number`` makes components."""
     found: Components = [0.0, 0.0, 0.0]
     for i, (each, way) in enumerate(zip(x, ways.T, strict=True)):
@@ -101,7 +101,7 @@ def times(B: Components, w: Components) -> list[Any]:
     return [B[0] * x + B[3] * y + B[4] * z, B[3] * x + B[1] * y + B[5] * z, B[4] * x + B[5] * y + B[2] * z]
 
 
-def tangents(v: Components) -> tuple[list[Any], list[Any]]:
+def build_tangents(v: Components) -> tuple[list[Any], list[Any]]:
     """Two unit vectors that make a right-handed triad with a unit vector."""
     x, y, z = v
     flat = abs(z) < 0.7

@@ -13,7 +13,7 @@ X = TypeVar("X")
 
 
 @dataclass(frozen=True)
-class Damping:
+class DampingFactor:
     """A factor that is eased where a step helped, down to ``least``, and grows tenfold where it did not; above ``most``
     the descent is given up."""
 
@@ -41,7 +41,7 @@ def descend(
     x: X,
     evaluate: Callable[[X], tuple[Array, Array]],
     advance: Callable[[X, Residual, float], X | None],
-    damping: Damping,
+    damping: DampingFactor,
     iterations: int,
     content: Callable[[Residual], bool],
 ) -> tuple[X, Residual]:
@@ -66,7 +66,7 @@ def descend_together(
     starts: Sequence[X],
     evaluate: Callable[[Mapping[int, X]], Iterable[tuple[Array, Array]]],
     advance: Callable[[Mapping[int, tuple[X, Residual, float]]], Mapping[int, X | None]],
-    damping: Damping,
+    damping: DampingFactor,
     iterations: int,
     content: Callable[[Residual], bool],
 ) -> Iterator[tuple[X, Residual]]:

@@ -12,8 +12,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..budgets import SURELY_MEANT
-from ..tolerances import RANK_GAP, SAME_POINT
+from ..budgets import INCIDENCE_SAMPLES_COUNT
+from ..tolerances import POINT_DISTANCE_TOL, RANK_GAP_MIN
 from .vectors import Array, cross, dot
 
 Indices = NDArray[np.intp]
@@ -41,15 +41,15 @@ class Sieve:
 
     def keep(self, candidates: Indices, value: Callable[[Indices, slice], Array], tolerance: float) -> Indices:
         """The candidates (m, k) whose ``value`` (m, configurations, …) vanishes at all configurations."""
-        near = candidates[self._sizes(candidates, value, slice(1)).max(axis=1, initial=0.0) < RANK_GAP * tolerance]
+        near = candidates[self._sizes(candidates, value, slice(1)).max(axis=1, initial=0.0) < RANK_GAP_MIN * tolerance]
         sizes = self._sizes(near, value, slice(None))
         defects = sizes.max(axis=1, initial=0.0)
         kept = defects < tolerance
         self.accepted = max(self.accepted, float(np.max(defects, where=kept, initial=0.0)))
-        close, far = ~kept & (defects < RANK_GAP * tolerance), defects >= RANK_GAP * tolerance
+        close, far = ~kept & (defects < RANK_GAP_MIN * tolerance), defects >= RANK_GAP_MIN * tolerance
         self.rejected = min(self.rejected, float(np.min(defects, where=close, initial=np.inf)))
         here = sizes < tolerance
-        for row in here[here[:, 0] & (here[:, 1:].sum(axis=1) >= SURELY_MEANT) & far]:
+        for row in here[here[:, 0] & (here[:, 1:].sum(axis=1) >= INCIDENCE_SAMPLES_COUNT) & far]:
             self.mixed = int(row[1:].sum()), len(row) - 1
         return near[kept]
 
@@ -62,17 +62,17 @@ class Sieve:
         return np.asarray(found.reshape(*found.shape[:2], -1).max(axis=2))
 
 
-def choices(n: int, k: int) -> Indices:
+def list_choices(n: int, k: int) -> Indices:
     """All sets of k of n numbers, one a row."""
-    return rows(combinations(range(n), k), k)
+    return convert_to_rows(combinations(range(n), k), k)
 
 
-def rows(tuples: Iterable[Sequence[int]], k: int) -> Indices:
+def convert_to_rows(tuples: Iterable[Sequence[int]], k: int) -> Indices:
     """Tuples of k numbers, one a row, even if there are none."""
     return np.array(list(tuples), dtype=np.intp).reshape(-1, k)
 
 
-def incidences(
+def find_incidences(
     sieve: Sieve,
     classes: Array,
     points: Array,
@@ -96,23 +96,27 @@ def incidences(
         return dot(between(c, s), classes[c[:, 2], s])
 
     count = range(len(classes))
-    pairs = choices(len(points), 2)
-    same = sieve.keep(pairs, between, SAME_POINT).tolist()
+    pairs = list_choices(len(points), 2)
+    same = sieve.keep(pairs, between, POINT_DISTANCE_TOL).tolist()
     apart = [(j, k) for j, k in pairs.tolist() if [j, k] not in same]
-    candidates = rows(((j, k, c) for j, k in apart for c in count if together[j, k] or c in owns[j] | owns[k]), 3)
-    parallel = sieve.keep(candidates, along, SAME_POINT).tolist()
+    candidates = convert_to_rows(
+        ((j, k, c) for j, k in apart for c in count if together[j, k] or c in owns[j] | owns[k]), 3
+    )
+    parallel = sieve.keep(candidates, along, POINT_DISTANCE_TOL).tolist()
     lined = {(j, k) for j, k, _ in parallel}
     rest = [(j, k) for j, k in apart if together[j, k] and (j, k) not in lined]
-    normal = sieve.keep(rows(((j, k, c) for j, k in rest for c in count), 3), across, SAME_POINT).tolist()
+    normal = sieve.keep(
+        convert_to_rows(((j, k, c) for j, k in rest for c in count), 3), across, POINT_DISTANCE_TOL
+    ).tolist()
     return [
         *(Incidence(((k, 1), (j, -1)), "zero") for j, k in same),
         *(Incidence(((k, 1), (j, -1)), "parallel", (c,)) for j, k, c in parallel),
         *(Incidence(((k, 1), (j, -1)), "normal", (c,)) for j, k, c in normal),
-        *_parallelograms(sieve, classes, points, together, slides),
+        *_find_parallelograms(sieve, classes, points, together, slides),
     ]
 
 
-def _parallelograms(
+def _find_parallelograms(
     sieve: Sieve, classes: Array, points: Array, together: NDArray[np.bool_], slides: Sequence[set[int]]
 ) -> list[Incidence]:
     """P_i − P_j = P_k − P_m, where ij, km, ik and jm are sides on links; up to a slide along an axis all four share."""
@@ -131,9 +135,13 @@ def _parallelograms(
         for m in beside[j] & beside[k]
         if i < min(j, m) and not (together[i, m] and together[j, k])
     ]
-    closed = sieve.keep(rows(quads, 4), gap, SAME_POINT).tolist()
+    closed = sieve.keep(convert_to_rows(quads, 4), gap, POINT_DISTANCE_TOL).tolist()
     shared = ((*quad, c) for quad in quads for c in set.intersection(*(slides[i] for i in quad)))
-    slid = [each for each in sieve.keep(rows(shared, 5), gap_across, SAME_POINT).tolist() if each[:4] not in closed]
+    slid = [
+        each
+        for each in sieve.keep(convert_to_rows(shared, 5), gap_across, POINT_DISTANCE_TOL).tolist()
+        if each[:4] not in closed
+    ]
 
     def terms(quad: list[int]) -> tuple[tuple[int, int], ...]:
         return tuple(zip(quad[:4], (1, -1, -1, 1), strict=True))

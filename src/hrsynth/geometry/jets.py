@@ -52,7 +52,9 @@ class Jet:
         return Jet(
             a * b,
             self.slope * b[..., None] + other.slope * a[..., None],
-            self.bend * b[..., None, None] + other.bend * a[..., None, None] + _both(self.slope, other.slope),
+            self.bend * b[..., None, None]
+            + other.bend * a[..., None, None]
+            + _add_transposed_product(self.slope, other.slope),
         )
 
     __rmul__ = __mul__
@@ -76,7 +78,7 @@ class Jet:
         return Jet(
             value,
             self.slope * first[..., None],
-            self.bend * first[..., None, None] + _tensor(self.slope, self.slope) * second[..., None, None],
+            self.bend * first[..., None, None] + _compute_tensor(self.slope, self.slope) * second[..., None, None],
         )
 
 
@@ -88,13 +90,13 @@ def turn(s: Jet, c: Jet) -> Jet:
     bend = (
         s.bend * a.value[..., None, None]
         - c.bend * b.value[..., None, None]
-        + _tensor(s.slope, a.slope)
-        - _tensor(c.slope, b.slope)
+        + _compute_tensor(s.slope, a.slope)
+        - _compute_tensor(c.slope, b.slope)
     )
-    return Jet(angle(s.value, c.value), slope, bend)
+    return Jet(compute_jet_angle(s.value, c.value), slope, bend)
 
 
-def angle(s: Any, c: Any) -> Any:
+def compute_jet_angle(s: Any, c: Any) -> Any:
     """atan2(s, c); of forms an enclosure, not a number where both may vanish, or the angle may pass half a turn."""
     if not isinstance(s, AffineForms):
         return np.arctan2(s, c)
@@ -108,9 +110,9 @@ def angle(s: Any, c: Any) -> Any:
     return AffineForms(middle, doubt)
 
 
-def _tensor(a: Any, b: Any) -> Any:
+def _compute_tensor(a: Any, b: Any) -> Any:
     return a[..., :, None] * b[..., None, :]
 
 
-def _both(a: Any, b: Any) -> Any:
-    return _tensor(a, b) + _tensor(b, a)
+def _add_transposed_product(a: Any, b: Any) -> Any:
+    return _compute_tensor(a, b) + _compute_tensor(b, a)

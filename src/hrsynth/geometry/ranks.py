@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import RankUndecided
-from ..tolerances import NAMED, RANK_CUTOFF, RANK_GAP, SAME_DIRECTION
+from ..errors import UndecidedRank
+from ..tolerances import DIRECTION_SINE_TOL, NAMED_TWIST_TOL, RANK_CUTOFF_FRACTION, RANK_GAP_MIN
 from .vectors import Array
 
 EPSILON, TINY = float(np.finfo(float).eps), float(np.finfo(float).tiny)
@@ -31,13 +31,13 @@ class Rank:
         return self.weakest / self.gap
 
     def decided(self, what: str) -> int:
-        """The rank, if the gap is large enough for a verdict; raises ``RankUndecided`` otherwise."""
-        if self.gap < RANK_GAP:
-            raise RankUndecided(what, self.gap, RANK_GAP)
+        """The rank, if the gap is large enough for a verdict; raises ``UndecidedRank`` otherwise."""
+        if self.gap < RANK_GAP_MIN:
+            raise UndecidedRank(what, self.gap, RANK_GAP_MIN)
         return self.value
 
 
-def rank_of(singular_values: Array, scale: float | None = None, cutoff: float = RANK_CUTOFF) -> Rank:
+def rank_of(singular_values: Array, scale: float | None = None, cutoff: float = RANK_CUTOFF_FRACTION) -> Rank:
     """The rank that descending singular values show: those above ``cutoff`` × ``scale`` (default: the largest)."""
     values = np.asarray(singular_values, dtype=float).tolist()
     if not values:
@@ -54,7 +54,7 @@ def rank_of(singular_values: Array, scale: float | None = None, cutoff: float = 
     return Rank(kept, last / dropped, last / largest)
 
 
-def singular_decomposition(matrix: Array, full_matrices: bool = False) -> tuple[Array, Array, Array]:
+def decompose_matrix(matrix: Array, full_matrices: bool = False) -> tuple[Array, Array, Array]:
     """U, s, Vᵀ of a matrix (rows, columns). LAPACK's divide and conquer gives up on some matrices with many equal
     singular values; QR iteration, which is slower, does these."""
     try:
@@ -68,59 +68,59 @@ def singular_decomposition(matrix: Array, full_matrices: bool = False) -> tuple[
         return U, s, Vt
 
 
-def decomposed_together(matrices: Sequence[Array], full_matrices: bool = False) -> list[tuple[Array, Array, Array]]:
-    """:func:`singular_decomposition` of several matrices, those of one shape in one call: the same digits."""
+def decompose_matrices(matrices: Sequence[Array], full_matrices: bool = False) -> list[tuple[Array, Array, Array]]:
+    """:func:`decompose_matrix` of several matrices, those of one shape in one call: the same digits."""
     if len({matrix.shape for matrix in matrices}) == 1:
         try:
             return list(zip(*np.linalg.svd(np.array(matrices), full_matrices=full_matrices), strict=True))
         except np.linalg.LinAlgError:
             pass
-    return [singular_decomposition(matrix, full_matrices) for matrix in matrices]
+    return [decompose_matrix(matrix, full_matrices) for matrix in matrices]
 
 
-def range_basis(matrix: Array, scale: float | None = None) -> tuple[Array, Rank]:
+def compute_range_basis(matrix: Array, scale: float | None = None) -> tuple[Array, Rank]:
     """An orthonormal basis (rows of ``matrix`` long) of the column space, with the rank."""
-    return range_bases([matrix], scale)[0]
+    return compute_range_bases([matrix], scale)[0]
 
 
-def range_bases(matrices: Sequence[Array], scale: float | None = None) -> list[tuple[Array, Rank]]:
-    """:func:`range_basis` of several matrices."""
+def compute_range_bases(matrices: Sequence[Array], scale: float | None = None) -> list[tuple[Array, Rank]]:
+    """:func:`compute_range_basis` of several matrices."""
     if any(0 in matrix.shape for matrix in matrices):
         return [
-            range_basis(matrix, scale) if matrix.size else (np.zeros((matrix.shape[0], 0)), Rank(0, CLEAN))
+            compute_range_basis(matrix, scale) if matrix.size else (np.zeros((matrix.shape[0], 0)), Rank(0, CLEAN))
             for matrix in matrices
         ]
-    ranks = [(U, rank_of(s, scale)) for U, s, _ in decomposed_together(matrices)]
+    ranks = [(U, rank_of(s, scale)) for U, s, _ in decompose_matrices(matrices)]
     return [(U[:, : rank.value], rank) for U, rank in ranks]
 
 
-def random_in(basis: Array, rng: np.random.Generator) -> Array:
+def draw_in_space(basis: Array, rng: np.random.Generator) -> Array:
     """A random vector (rows,) of the space that an orthonormal basis (rows, k) spans, whichever basis that is: a normal
     one, projected."""
     return np.asarray(basis @ (basis.T @ rng.normal(size=len(basis))))
 
 
-def space_basis(matrix: Array, scale: float | None = None) -> Array:
+def compute_space_basis(matrix: Array, scale: float | None = None) -> Array:
     """An orthonormal basis (rows, rank) of the column space that depends on the space alone, not on its columns or the
     last digit: coordinate axes where these span it, else those that lie nearest to it, one after the other, as they
     are in it (a Cholesky decomposition of the projector with pivots; of equal ones the first)."""
-    found = range_basis(matrix, scale)[0]
+    found = compute_range_basis(matrix, scale)[0]
     onto = found @ found.T
     along = np.diag(onto) > 0.5
-    if np.max(np.abs(onto - np.diag(along)), initial=0.0) < SAME_DIRECTION:
+    if np.max(np.abs(onto - np.diag(along)), initial=0.0) < DIRECTION_SINE_TOL:
         return np.eye(len(matrix))[:, along]
     basis = np.zeros_like(found)
     for k in range(found.shape[1]):
         near = np.diag(onto)
-        i = int(np.argmax(near > (1 - NAMED) * near.max()))
+        i = int(np.argmax(near > (1 - NAMED_TWIST_TOL) * near.max()))
         basis[:, k] = onto[i] / np.sqrt(onto[i, i])
         onto = onto - np.outer(basis[:, k], basis[:, k])
     return basis
 
 
-def kernel_basis(matrix: Array, scale: float | None = None) -> tuple[Array, Rank]:
+def compute_kernel_basis(matrix: Array, scale: float | None = None) -> tuple[Array, Rank]:
     """An orthonormal basis of the kernel, shape (columns, nullity), with the rank of the matrix."""
-    found = spectrum(matrix, scale)
+    found = compute_matrix_spectrum(matrix, scale)
     return found.kernel, found.rank
 
 
@@ -136,15 +136,15 @@ class Spectrum:
     right: Array
 
 
-def spectrum(matrix: Array, scale: float | None = None) -> Spectrum:
+def compute_matrix_spectrum(matrix: Array, scale: float | None = None) -> Spectrum:
     """The spectrum of a matrix; ``scale`` as in :func:`rank_of`."""
-    return spectra([matrix], scale)[0]
+    return compute_matrix_spectra([matrix], scale)[0]
 
 
-def spectra(matrices: Sequence[Array], scale: float | None = None) -> list[Spectrum]:
-    """:func:`spectrum` of several matrices."""
+def compute_matrix_spectra(matrices: Sequence[Array], scale: float | None = None) -> list[Spectrum]:
+    """:func:`compute_matrix_spectrum` of several matrices."""
     if len({matrix.shape for matrix in matrices}) != 1:
-        return [spectrum(matrix, scale) for matrix in matrices]
+        return [compute_matrix_spectrum(matrix, scale) for matrix in matrices]
     rows, columns = matrices[0].shape
     if 0 in (rows, columns):
         return [
@@ -152,20 +152,20 @@ def spectra(matrices: Sequence[Array], scale: float | None = None) -> list[Spect
             for _ in matrices
         ]
     found = []
-    for U, s, Vt in decomposed_together(matrices, full_matrices=rows < columns):
+    for U, s, Vt in decompose_matrices(matrices, full_matrices=rows < columns):
         rank = rank_of(s, scale)
         r = rank.value
         found.append(Spectrum(Vt[r:].T, rank, s[:r], U[:, :r], Vt[:r].T))
     return found
 
 
-def singular_values(matrices: Array) -> Array:
+def compute_singular_values(matrices: Array) -> Array:
     """The singular values of each matrix (k, rows, columns), divided by the largest where that is above one; (k, n)."""
     values = np.linalg.svd(matrices, compute_uv=False)
     return np.asarray(values / np.maximum(values.max(axis=1, initial=1.0), 1.0)[:, None])
 
 
-def largest_angle(A: Array, B: Array) -> float:
+def compute_largest_angle(A: Array, B: Array) -> float:
     """The largest principal angle (radians) between two column spaces given by orthonormal bases; π/2 where their
     dimensions differ."""
     if A.shape[1] != B.shape[1]:

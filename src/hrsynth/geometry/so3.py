@@ -10,35 +10,35 @@ import math
 
 import numpy as np
 
-from .vectors import Array, cross, hat, perpendicular
+from .vectors import Array, cross, find_perpendicular, hat
 
 
-def exponential(vectors: Array) -> Array:
+def convert_vectors_to_rotations(vectors: Array) -> Array:
     """The rotations (..., 3, 3) of rotation vectors (..., 3): I + sin θ / θ [v]ₓ + (1 − cos θ) / θ² [v]ₓ²."""
     angle = np.linalg.norm(vectors, axis=-1)[..., None, None] / np.pi
     K = hat(vectors)
     return np.asarray(np.eye(3) + np.sinc(angle) * K + 0.5 * np.sinc(0.5 * angle) ** 2 * (K @ K))
 
 
-def logarithm(R: Array) -> Array:
+def convert_rotations_to_vectors(R: Array) -> Array:
     """The rotation vectors (..., 3) of rotations (..., 3, 3), no longer than π; either of the two at half a turn."""
     if R.ndim == 2:
-        w, x, y, z = _quaternion(R)
+        w, x, y, z = _convert_to_quaternion(R)
         sine = math.hypot(x, y, z)
         factor = 2.0 * math.copysign(math.atan2(sine, abs(w)), w) / sine if sine > 0.0 else 0.0
         return np.array([factor * x, factor * y, factor * z])
-    q = quaternions(R)
+    q = convert_to_quaternions(R)
     sines = np.linalg.norm(q[..., 1:], axis=-1)
     factors = 2.0 * np.arctan2(sines, q[..., 0]) / np.where(sines > 0.0, sines, 1.0)
     return np.asarray(factors[..., None] * q[..., 1:])
 
 
-def angle_of(R: Array) -> float:
+def compute_rotation_angle(R: Array) -> float:
     """The angle by which a rotation (3, 3) turns, from 0 to π."""
-    return float(np.linalg.norm(logarithm(R)))
+    return float(np.linalg.norm(convert_rotations_to_vectors(R)))
 
 
-def logarithm_rate(vector: Array) -> Array:
+def compute_rotation_vector_rate(vector: Array) -> Array:
     """The map (3, 3) from the angular velocity to the rate of the rotation vector, shorter than 2π:
     I − [v]ₓ/2 + (1/θ² − cot(θ/2) / 2θ) [v]ₓ²."""
     angle, K = float(np.linalg.norm(vector)), hat(vector)
@@ -46,7 +46,7 @@ def logarithm_rate(vector: Array) -> Array:
     return np.asarray(np.eye(3) - 0.5 * K + factor * K @ K)
 
 
-def between(a: Array, b: Array) -> Array:
+def find_smallest_rotations(a: Array, b: Array) -> Array:
     """The rotation vectors (..., 3) of the smallest turns that bring unit vectors a (..., 3) to b (..., 3); of opposite
     ones half a turn about some normal."""
     across = cross(a, b)
@@ -66,7 +66,7 @@ def between(a: Array, b: Array) -> Array:
 def turn_about(normal: Array, R: Array) -> tuple[float, Array]:
     """The turn of a rotation about ``normal`` (its twist, the swing left out), in (−π, π], and the row (3,) that makes
     its rate of the angular velocity; not a number where the swing is half a turn, which leaves no twist."""
-    w, *vector = _quaternion(R)
+    w, *vector = _convert_to_quaternion(R)
     v = np.array(vector)
     along, size = float(normal @ v), math.sqrt(w * w + v @ v)
     w, v, along = w / size, v / size, along / size
@@ -76,10 +76,10 @@ def turn_about(normal: Array, R: Array) -> tuple[float, Array]:
     return wrap_angle(2 * math.atan2(along, w)), (w * w * normal + w * cross(v, normal) + along * v) / both
 
 
-def turns_about(axes: Array, R: Array) -> Array:
+def decompose_rotation(axes: Array, R: Array) -> Array:
     """The angles (k,) about up to three axes (k, 3), at right angles to each other, of which a rotation is made: R =
     exp θ₁[a₁]ₓ exp θ₂[a₂]ₓ …; the second one within a quarter turn where there are three."""
-    a, b, c = _frame(axes)
+    a, b, c = _extend_to_frame(axes)
     E = np.array([a, b, c])
     R = E @ R @ E.T
     if len(axes) < 3:
@@ -94,10 +94,10 @@ def turns_about(axes: Array, R: Array) -> Array:
     ) * [1.0, 1.0, np.sign(np.linalg.det(E))]
 
 
-def _frame(axes: Array) -> tuple[Array, Array, Array]:
+def _extend_to_frame(axes: Array) -> tuple[Array, Array, Array]:
     """Three axes at right angles to each other, those of ``axes`` (k, 3) first."""
     a = axes[0]
-    b = axes[1] if len(axes) > 1 else perpendicular(a)
+    b = axes[1] if len(axes) > 1 else find_perpendicular(a)
     return a, b, axes[2] if len(axes) > 2 else cross(a, b)
 
 
@@ -106,7 +106,7 @@ def wrap_angle(angle: float) -> float:
     return angle if -np.pi < angle <= np.pi else float(-((np.pi - angle) % (2 * np.pi)) + np.pi)
 
 
-def quaternions(R: Array) -> Array:
+def convert_to_quaternions(R: Array) -> Array:
     """Unit quaternions (..., 4) as (w, x, y, z) of rotations (..., 3, 3), w not negative."""
     trace = np.trace(R, axis1=-2, axis2=-1)
     products = np.empty((*R.shape[:-2], 4, 4))
@@ -120,7 +120,7 @@ def quaternions(R: Array) -> Array:
     return np.asarray(found * np.where(found[..., :1] < 0, -1.0, 1.0))
 
 
-def rotation_of(q: Array) -> Array:
+def convert_from_quaternion(q: Array) -> Array:
     """The rotation (3, 3) of a unit quaternion (w, x, y, z)."""
     w, x, y, z = q.tolist()
     return np.array(
@@ -132,8 +132,8 @@ def rotation_of(q: Array) -> Array:
     )
 
 
-def _quaternion(R: Array) -> tuple[float, float, float, float]:
-    """A quaternion (w, x, y, z) of one rotation, of any length: faster than :func:`quaternions`."""
+def _convert_to_quaternion(R: Array) -> tuple[float, float, float, float]:
+    """A quaternion (w, x, y, z) of one rotation, of any length: faster than :func:`convert_to_quaternions`."""
     (a, b, c), (d, e, f), (g, h, i) = R.tolist()
     squares = 1 + a + e + i, 1 + a - e - i, 1 - a + e - i, 1 - a - e + i
     match squares.index(max(squares)):

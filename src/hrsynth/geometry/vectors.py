@@ -10,27 +10,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..tolerances import NAMED
+from ..tolerances import NAMED_TWIST_TOL
 
 Array = NDArray[np.float64]
 Numbers = NDArray[Any]
 """Floats, or objects: whole and rational numbers, balls, duals."""
 
 
-def frozen(values: ArrayLike) -> Array:
+def freeze_array(values: ArrayLike) -> Array:
     """A read-only copy of ``values`` as floats."""
     array = np.array(values, dtype=float)
     array.setflags(write=False)
     return array
 
 
-def whole_multiple(vector: Numbers) -> tuple[Numbers, int]:
+def scale_to_whole(vector: Numbers) -> tuple[Numbers, int]:
     """The first multiple of a rational vector that has whole entries, and how many times it is taken."""
     scale = lcm(*(int(x.q) for x in vector))
     return np.array([x.p * (scale // x.q) for x in vector], dtype=object), scale
 
 
-def unit(vector: ArrayLike) -> Array:
+def normalise_vector(vector: ArrayLike) -> Array:
     """``vector`` divided by its length; shape (3,). Raises ``ValueError`` for a zero vector."""
     array = np.asarray(vector, dtype=float)
     length = math.sqrt(array @ array)
@@ -42,7 +42,7 @@ def unit(vector: ArrayLike) -> Array:
 def orient_axis(axis: Array) -> Array:
     """Return an axis (3,) in its canonical sense: its largest component positive, of equal ones the first."""
     sizes = np.abs(axis)
-    return axis if axis[np.argmax(sizes > (1 - NAMED) * sizes.max())] >= 0 else -axis
+    return axis if axis[np.argmax(sizes > (1 - NAMED_TWIST_TOL) * sizes.max())] >= 0 else -axis
 
 
 def dot(a: Numbers, b: Numbers, axis: int = -1) -> Numbers:
@@ -102,12 +102,12 @@ def hat(vectors: ArrayLike) -> Array:
     return found
 
 
-def angle_between(one: Array, other: Array) -> float:
+def measure_angle(one: Array, other: Array) -> float:
     """The angle of two vectors, 0 to π."""
     return float(np.arctan2(np.linalg.norm(cross(one, other)), one @ other))
 
 
-def pose(position: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike | None = None) -> Array:
+def build_pose(position: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike | None = None) -> Array:
     """The homogeneous pose X_AB with p_AB and R_AB; shape (4, 4)."""
     matrix = np.eye(4)
     matrix[:3, 3] = position
@@ -121,13 +121,13 @@ def transform(X_AB: Array, p_B: Array) -> Array:
     return np.asarray(X_AB[:3, :3] @ p_B + X_AB[:3, 3])
 
 
-def inverse(X_AB: Array) -> Array:
+def invert_pose(X_AB: Array) -> Array:
     """X_BA of X_AB; shape (4, 4)."""
     rotation = X_AB[:3, :3].T
-    return pose(-rotation @ X_AB[:3, 3], rotation)
+    return build_pose(-rotation @ X_AB[:3, 3], rotation)
 
 
-def pose_difference(X: Array, other: Array, length: float, point: Array | None = None) -> float:
+def compare_poses(X: Array, other: Array, length: float, point: Array | None = None) -> float:
     """Return the difference of two poses (4, 4): the larger of the shift (in lengths) and the difference of the
     rotations, each by its largest entry; of a ``point`` (3,) of the body, if it is given, the shift alone."""
     if point is not None:
@@ -136,43 +136,43 @@ def pose_difference(X: Array, other: Array, length: float, point: Array | None =
     return float(max(np.max(gap[:3, 3]) / length, np.max(gap[:3, :3])))
 
 
-def rotation_about(axis: ArrayLike, angle: float) -> Array:
+def rotate_about_axis(axis: ArrayLike, angle: float) -> Array:
     """Rodrigues: the rotation by ``angle`` about the unit vector along ``axis``; shape (3, 3)."""
-    K = hat(unit(axis))
+    K = hat(normalise_vector(axis))
     return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K)
 
 
-def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> Array:
+def convert_rpy_to_rotation(roll: float, pitch: float, yaw: float) -> Array:
     """URDF's fixed-axis roll, pitch, yaw: Rz(yaw) Ry(pitch) Rx(roll); shape (3, 3)."""
-    return rotation_about((0, 0, 1), yaw) @ rotation_about((0, 1, 0), pitch) @ rotation_about((1, 0, 0), roll)
+    return rotate_about_axis((0, 0, 1), yaw) @ rotate_about_axis((0, 1, 0), pitch) @ rotate_about_axis((1, 0, 0), roll)
 
 
-def perpendicular(axis: ArrayLike, near: ArrayLike | None = None) -> Array:
+def find_perpendicular(axis: ArrayLike, near: ArrayLike | None = None) -> Array:
     """A unit vector normal to ``axis``: the part of ``near`` normal to it where that is not (nearly) zero."""
-    n = unit(axis)
+    n = normalise_vector(axis)
     candidates: Iterable[ArrayLike] = ([] if near is None else [near]) + [np.eye(3)[i] for i in np.argsort(np.abs(n))]
     for candidate in candidates:
         rest = np.asarray(candidate, dtype=float) - n * float(n @ np.asarray(candidate, dtype=float))
         if np.linalg.norm(rest) > 1e-6:
-            return unit(rest)
+            return normalise_vector(rest)
     raise AssertionError("three coordinate axes cannot all be parallel to one vector")
 
 
-def plane_axes(normal: Array, near: ArrayLike | None = None) -> Array:
-    """Two unit vectors that make a right-handed triad with a unit normal, the first one as :func:`perpendicular` finds
-    it; shape (2, 3)."""
-    first = perpendicular(normal, near)
+def build_plane_axes(normal: Array, near: ArrayLike | None = None) -> Array:
+    """Two unit vectors that make a right-handed triad with a unit normal, the first one as :func:`find_perpendicular`
+    finds it; shape (2, 3)."""
+    first = find_perpendicular(normal, near)
     return np.array([first, cross(normal, first)])
 
 
-def nested_lists(values: Array) -> list[Any]:
+def convert_to_lists(values: Array) -> list[Any]:
     """Nested lists of numbers, None where they are not finite."""
     found = values.astype(object)
     found[~np.isfinite(values)] = None
     return list(found.tolist())
 
 
-def steady_order(rows: Array, apart: float) -> list[int]:
+def sort_rows(rows: Array, apart: float) -> list[int]:
     """The lexicographic order of rows (n, k) that no last digit decides: in a column, values between which lie only
     gaps of at most ``apart`` count as equal."""
     places = [np.empty(len(rows), dtype=int) for _ in range(rows.shape[1])]

@@ -13,22 +13,22 @@ from itertools import product
 
 import numpy as np
 
-from ..budgets import LEG_ITERATIONS
+from ..budgets import LEG_CLOSURE_ITERATIONS_MAX
 from ..description.assembly.zero_configuration import zeroed_at
-from ..errors import LoopsNotClosed
-from ..geometry.vectors import Array, inverse
+from ..errors import LoopClosureFailure
+from ..geometry.vectors import Array, invert_pose
 from ..mechanism import Joint, JointType, Mechanism, Observation
 from ..mechanism.legs import Leg, LegDecomposition
-from ..tolerances import CLOSED, SOLVED
+from ..tolerances import CLOSURE_RESIDUAL_TOL, CLOSURE_SOLVER_TOL
 from . import limits
 from .configuration import ClosedConfiguration
-from .leg_paths import MotionFactor, ways
-from .leg_reach import alone
-from .leg_solutions import UNDECIDED, LegEnd, LegSolutions, ReachFailure, leg_closures
+from .leg_paths import MotionFactor, list_leg_paths
+from .leg_reach import extract_leg
+from .leg_solutions import UNDECIDED, LegEnd, LegSolutions, ReachFailure, solve_leg
 from .pinocchio_model import PinocchioModel
 from .tasks import LinkPoses, PoseAndValuesTask, solve
 
-STARTS = 24
+LEG_START_CONFIGURATIONS_COUNT = 24
 """Number of configurations of a leg, the zero configuration first, from which it is closed at a pose: for each of its
 listed solutions, and as many without a list."""
 
@@ -80,7 +80,8 @@ class Assembler:
     @cached_property
     def _twins(self) -> dict[str, PinocchioModel]:
         return {
-            leg.label: PinocchioModel(alone(self.decomposition, leg), self.length) for leg in self.decomposition.legs
+            leg.label: PinocchioModel(extract_leg(self.decomposition, leg), self.length)
+            for leg in self.decomposition.legs
         }
 
     @cached_property
@@ -103,7 +104,7 @@ class Assembler:
 
     def platform(self, bodies: Mapping[str, Array]) -> dict[str, Array]:
         """Return the poses (4, 4) of all links of the platform where the links on which legs end have these; raises
-        ``LoopsNotClosed`` if its own joints do not allow that."""
+        ``LoopClosureFailure`` if its own joints do not allow that."""
         return self._platform_at(bodies)[0]
 
     def _platform_at(
@@ -112,25 +113,27 @@ class Assembler:
         """Return the assembly with its joints that are beyond their limits, and whether one of them has no other value
         at these poses of the links, which are known to ``within``."""
         mechanism, body = self._platform, self.decomposition.legs[0].platform_link
-        displacement = bodies[body] @ inverse(mechanism.links[body].pose)
+        displacement = bodies[body] @ invert_pose(mechanism.links[body].pose)
         poses = {link: displacement @ mechanism.links[link].pose for link in self.decomposition.platform}
         base = mechanism.links[mechanism.base].pose
         model = PinocchioModel(zeroed_at(mechanism, {mechanism.base: base, **poses}), self.length)
         target = LinkPoses(tuple(bodies.items()))
         residual = np.inf
-        for start in _starts(model):
-            q, residual = solve(model, start, target, tolerance=SOLVED, iterations=60)
-            if residual <= CLOSED and all(_turned_as(model.pose(q, body), X) for body, X in bodies.items()):
+        for start in _list_starts(model):
+            q, residual = solve(model, start, target, tolerance=CLOSURE_SOLVER_TOL, iterations=60)
+            if residual <= CLOSURE_RESIDUAL_TOL and all(
+                _has_same_rotation(model.pose(q, body), X) for body, X in bodies.items()
+            ):
                 return (
                     {link: model.pose(q, link) for link in self.decomposition.platform},
-                    limits.outside(model, q),
+                    limits.list_joints_beyond(model, q),
                     self.decomposition.point is None and limits.is_proved_outside(model, q, bodies, within),
                 )
-        raise LoopsNotClosed(model.mechanism.name, residual, CLOSED, "inside the platform")
+        raise LoopClosureFailure(model.mechanism.name, residual, CLOSURE_RESIDUAL_TOL, "inside the platform")
 
     @cached_property
     def _ways(self) -> dict[str, list[tuple[MotionFactor, ...]]]:
-        return {leg.label: list(ways(self.decomposition, leg)) for leg in self.decomposition.legs}
+        return {leg.label: list(list_leg_paths(self.decomposition, leg)) for leg in self.decomposition.legs}
 
     def at(
         self, bodies: Mapping[str, Array], measured: Sequence[tuple[Observation, Array]], within: float = 0.0
@@ -149,7 +152,7 @@ class Assembler:
                 continue
             model, q = closing.found
             poses.update({link: model.pose(q, link) for link in leg.links if link not in poses})
-            beyond += limits.outside(model, q, leg.joints)
+            beyond += limits.list_joints_beyond(model, q, leg.joints)
             held |= closing.held
         if missing:
             return Assembly(None, tuple(missing), (), platform, tuple(misses))
@@ -166,47 +169,53 @@ class Assembler:
         whole = PinocchioModel(zeroed_at(mechanism, poses), self.length)
         return Assembly(ClosedConfiguration.of(whole, whole.q0), (), tuple(beyond), platform, (), held)
 
-    def _leg(self, leg: Leg, X: Array, measured: Sequence[tuple[Observation, Array]], within: float) -> _Closing:
+    def _leg(self, leg: Leg, X: Array, measured: Sequence[tuple[Observation, Array]], within: float) -> _LegClosure:
         """Close one leg with its end at X: within its joint limits if it is found there."""
         model = self._twins[leg.label]
         target = PoseAndValuesTask(leg.platform_link, X, self.decomposition.point, self.reference, tuple(measured))
         first = self._close(model, model.q0, target)
-        if first is not None and not limits.outside(model, first, leg.joints):
-            return _Closing((model, first))
+        if first is not None and not limits.list_joints_beyond(model, first, leg.joints):
+            return _LegClosure((model, first))
         zero = self.decomposition.mechanism.links[leg.platform_link].pose
-        end = LegEnd(X @ inverse(zero), self.length, within, target.point is None)
-        known = leg_closures(self._ways[leg.label], end)
+        end = LegEnd(X @ invert_pose(zero), self.length, within, target.point is None)
+        known = solve_leg(self._ways[leg.label], end)
         if known.miss is not None:
-            return _Closing(None, known.miss)
-        held = any(limits.all_excluded(model.mechanism, joint, values) for joint, values in known.values) or any(
+            return _LegClosure(None, known.miss)
+        held = any(
+            limits.is_every_value_excluded(model.mechanism, joint, values) for joint, values in known.values
+        ) or any(
             limits.is_tilt_excluded(way, dict(known.values), end.D, within, len(self._ways[leg.label]) == 1)
             for way in self._ways[leg.label]
         )
-        for start in () if held and first is not None else _starts(model, known):
+        for start in () if held and first is not None else _list_starts(model, known):
             q = self._close(model, start, target)
-            if q is not None and (held or not limits.outside(model, q, leg.joints)):
-                return _Closing((model, q), None, held)
+            if q is not None and (held or not limits.list_joints_beyond(model, q, leg.joints)):
+                return _LegClosure((model, q), None, held)
             first = q if first is None else first
-        return _Closing(None if first is None else (model, first), None, held)
+        return _LegClosure(None if first is None else (model, first), None, held)
 
     def _close(self, model: PinocchioModel, start: Array, target: PoseAndValuesTask) -> Array | None:
         """Return the closed configuration that a start leads to."""
-        q, residual = solve(model, start, target, tolerance=SOLVED, iterations=LEG_ITERATIONS)
-        turned = target.point is not None or _turned_as(model.pose(q, target.link), target.pose)
-        return q if residual <= CLOSED and turned else None
+        q, residual = solve(model, start, target, tolerance=CLOSURE_SOLVER_TOL, iterations=LEG_CLOSURE_ITERATIONS_MAX)
+        turned = target.point is not None or _has_same_rotation(model.pose(q, target.link), target.pose)
+        return q if residual <= CLOSURE_RESIDUAL_TOL and turned else None
 
 
-def of_links(model: PinocchioModel, pose: Callable[[str], Array]) -> ClosedConfiguration:
-    """Return the configuration of a model at which its links have their poses (4, 4); raises ``LoopsNotClosed``."""
+def build_from_link_poses(model: PinocchioModel, pose: Callable[[str], Array]) -> ClosedConfiguration:
+    """Return the configuration of a model at which its links have their poses (4, 4); raises ``LoopClosureFailure``."""
     poses = {link: pose(link) for link in model.mechanism.links}
-    q, residual = solve(model, model.read(poses.__getitem__), tolerance=SOLVED)
-    if residual > CLOSED or not all(_turned_as(model.pose(q, link), X) for link, X in poses.items()):
-        raise LoopsNotClosed(model.mechanism.name, residual, CLOSED, "in coordinates of the zero configuration")
+    q, residual = solve(model, model.read(poses.__getitem__), tolerance=CLOSURE_SOLVER_TOL)
+    if residual > CLOSURE_RESIDUAL_TOL or not all(
+        _has_same_rotation(model.pose(q, link), X) for link, X in poses.items()
+    ):
+        raise LoopClosureFailure(
+            model.mechanism.name, residual, CLOSURE_RESIDUAL_TOL, "in coordinates of the zero configuration"
+        )
     return ClosedConfiguration.of(model, q)
 
 
 @dataclass(frozen=True, eq=False)
-class _Closing:
+class _LegClosure:
     """Leg at a pose: its closed configuration (model, q), or the proof that there is none, or neither; whether all its
     solutions are beyond limits."""
 
@@ -215,19 +224,19 @@ class _Closing:
     held: bool = False
 
 
-def _turned_as(X: Array, wanted: Array) -> bool:
+def _has_same_rotation(X: Array, wanted: Array) -> bool:
     """Return True if two poses have one rotation: the solver's error of a rotation vanishes at half a turn as well."""
     return float(np.trace(X[:3, :3].T @ wanted[:3, :3])) > 1.0
 
 
-def _starts(model: PinocchioModel, known: LegSolutions = UNDECIDED) -> Iterator[Array]:
+def _list_starts(model: PinocchioModel, known: LegSolutions = UNDECIDED) -> Iterator[Array]:
     """Yield configurations with the joints' known values, other joints as at zero, then random, always the same; last
     without values."""
     rng = np.random.default_rng(0)
     joints = [model.coordinates[joint] for joint, _ in known.values if joint in model.coordinates]
     lists = [
         [
-            float(value.mid()) / (model.length if model.mechanism.joints[joint].type.slides else 1.0)
+            float(value.mid()) / (model.length if model.mechanism.joints[joint].type.has_translation else 1.0)
             for value in values
             if value.is_finite()
         ]
@@ -235,7 +244,7 @@ def _starts(model: PinocchioModel, known: LegSolutions = UNDECIDED) -> Iterator[
         if joint in model.coordinates
     ]
     for combination in (*product(*lists), None):
-        for number in range(STARTS):
+        for number in range(LEG_START_CONFIGURATIONS_COUNT):
             step = rng.uniform(-np.pi, np.pi, model.nv) if number else np.zeros(model.nv)
             if combination is not None:
                 for (place,), value in zip(joints, combination, strict=True):

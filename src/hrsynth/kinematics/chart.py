@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from ..errors import LoopsNotClosed
-from ..geometry.ranks import range_basis
+from ..errors import LoopClosureFailure
+from ..geometry.ranks import compute_range_basis
 from ..geometry.vectors import Array
-from ..tolerances import CLOSED, SOLVED
+from ..tolerances import CLOSURE_RESIDUAL_TOL, CLOSURE_SOLVER_TOL
 from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
 from .tasks import solve
@@ -46,15 +46,15 @@ class TangentChart:
         """The chart whose directions are those that move the platform or anything that is observed."""
         kernel, _ = centre.kernel()
         image = observation_model.rows(centre) @ kernel
-        return cls(centre, kernel @ range_basis(image.T, 1.0)[0])
+        return cls(centre, kernel @ compute_range_basis(image.T, 1.0)[0])
 
     def at(self, y: Array, near: Array, *, iterations: int = 15) -> ClosedConfiguration:
         """The configuration with the coordinates y that lies next to the configuration ``near`` (nq,); raises
-        ``LoopsNotClosed``."""
+        ``LoopClosureFailure``."""
         model = self.centre.model
-        q, residual = solve(model, near, _Coordinates(self, y), tolerance=SOLVED, iterations=iterations)
-        if not residual <= CLOSED:
-            raise LoopsNotClosed(model.mechanism.name, residual, CLOSED, model.worst_loop(q)[0])
+        q, residual = solve(model, near, _Coordinates(self, y), tolerance=CLOSURE_SOLVER_TOL, iterations=iterations)
+        if not residual <= CLOSURE_RESIDUAL_TOL:
+            raise LoopClosureFailure(model.mechanism.name, residual, CLOSURE_RESIDUAL_TOL, model.worst_loop(q)[0])
         return ClosedConfiguration.of(model, q)
 
     def slope(self, q: Array) -> Array:

@@ -13,12 +13,12 @@ from itertools import accumulate
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import LoopsNotClosed
-from ..geometry.ranks import Rank, Spectrum, spectra, spectrum
-from ..geometry.vectors import Array, frozen
+from ..errors import LoopClosureFailure
+from ..geometry.ranks import Rank, Spectrum, compute_matrix_spectra, compute_matrix_spectrum
+from ..geometry.vectors import Array, freeze_array
 from ..mechanism.observation import Observation
 from ..results import Value
-from ..tolerances import CLOSED, LOOPS_SCALE
+from ..tolerances import CLOSURE_RESIDUAL_TOL, LOOP_SINGULAR_VALUE_MIN
 from .pinocchio_model import PinocchioModel
 
 
@@ -31,21 +31,24 @@ class ClosedConfiguration(Value):
     residual: float
 
     @classmethod
-    def of(cls, model: PinocchioModel, q: Array, tolerance: float = CLOSED) -> ClosedConfiguration:
-        """Return ``q`` as a closed configuration; raises ``LoopsNotClosed`` with the loop of the largest residual."""
-        q = frozen(q)
+    def of(cls, model: PinocchioModel, q: Array, tolerance: float = CLOSURE_RESIDUAL_TOL) -> ClosedConfiguration:
+        """Return ``q`` as a closed configuration; raises ``LoopClosureFailure`` with the loop of the largest
+        residual."""
+        q = freeze_array(q)
         residual = float(np.linalg.norm(model.residual(q)))
         if not residual <= tolerance:
-            raise LoopsNotClosed(model.mechanism.name, residual, tolerance, model.worst_loop(q)[0])
+            raise LoopClosureFailure(model.mechanism.name, residual, tolerance, model.worst_loop(q)[0])
         return cls(model, q, residual)
 
     @classmethod
     def several(
-        cls, model: PinocchioModel, places: Sequence[Array], tolerance: float = CLOSED
+        cls, model: PinocchioModel, places: Sequence[Array], tolerance: float = CLOSURE_RESIDUAL_TOL
     ) -> list[ClosedConfiguration]:
         """Return :meth:`of` of several, their constraints decomposed together."""
         found = [cls.of(model, q, tolerance) for q in places]
-        for at, loops in zip(found, spectra([model.jacobian(at.q) for at in found], LOOPS_SCALE), strict=True):
+        for at, loops in zip(
+            found, compute_matrix_spectra([model.jacobian(at.q) for at in found], LOOP_SINGULAR_VALUE_MIN), strict=True
+        ):
             at.__dict__["loops"] = loops
         return found
 
@@ -60,7 +63,7 @@ class ClosedConfiguration(Value):
     @cached_property
     def loops(self) -> Spectrum:
         """Decomposition of the constraints' Jacobian."""
-        return spectrum(self.model.jacobian(self.q), LOOPS_SCALE)
+        return compute_matrix_spectrum(self.model.jacobian(self.q), LOOP_SINGULAR_VALUE_MIN)
 
     def kernel(self) -> tuple[Array, Rank]:
         """A basis of T_qC, shape (nv, mobility), and the constraints' rank."""

@@ -12,28 +12,28 @@ from itertools import combinations
 
 import numpy as np
 
-from ..budgets import SLIDER_PART
-from ..geometry.screws import point_velocity
-from ..geometry.so3 import logarithm, logarithm_rate, turn_about, wrap_angle
+from ..budgets import SLIDER_RANGE_FRACTION
+from ..geometry.screws import compute_point_velocity
+from ..geometry.so3 import compute_rotation_vector_rate, convert_rotations_to_vectors, turn_about, wrap_angle
 from ..geometry.vectors import Array, orient_axis
 from ..results import Value
-from ..tolerances import NO_SLIDER, SAME_DIRECTION
+from ..tolerances import DIRECTION_SINE_TOL, SLIDER_SPAN_MIN_FRACTION
 from .configuration import ClosedConfiguration
 from .continuation import track
 from .pinocchio_model import PinocchioModel
 from .platform_motion import PlatformMotion
-from .velocity_relation import ObservationModel, relation
+from .velocity_relation import ObservationModel, compute_relation
 
 NAMES = ("x", "y", "z", "turn about x", "turn about y", "turn about z")
-INDEPENDENT = 0.5
+COORDINATE_INDEPENDENCE_FRACTION = 0.5
 """Least independence of the coordinates (the smallest singular value of their rates), as part of that of the most
 independent ones."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Coordinates(Value):
-    """Coordinates of a platform, by their indices among :data:`NAMES`, as a task: ``values`` (n,) in metres,
-    radians."""
+    """Coordinates of a platform, by their indices among :data:`TABLE_NAME_COLUMNS_MAX`, as a task: ``values`` (n,) in
+    metres, radians."""
 
     motion: PlatformMotion
     places: tuple[int, ...]
@@ -43,16 +43,16 @@ class Coordinates(Value):
     def of(cls, start: ClosedConfiguration, observation_model: ObservationModel, motion: PlatformMotion) -> Coordinates:
         """Return the coordinates that distinguish a configuration from its neighbours best, positions before rotations;
         if its dof differ from the generic ones, those of the generic motion."""
-        twists = relation(start, observation_model.of_platform).twists
+        twists = compute_relation(start, observation_model.of_platform).twists
         if twists.shape[1] != motion.dof:
             twists = motion.twists
         if motion.rotations.shape[1] == 1:
-            twists = np.vstack([twists[:3], _axis(motion) @ twists[3:]])
+            twists = np.vstack([twists[:3], _find_rotation_axis(motion) @ twists[3:]])
         rows = twists if motion.body else twists[:3]
         size = min(motion.dof, len(rows))
         sets = list(combinations(range(len(rows)), size))
         weakest = np.array([np.linalg.svd(rows[list(each)], compute_uv=False)[:size].min(initial=1.0) for each in sets])
-        chosen = sets[int(np.argmax(weakest >= INDEPENDENT * weakest.max()))]
+        chosen = sets[int(np.argmax(weakest >= COORDINATE_INDEPENDENCE_FRACTION * weakest.max()))]
         made = cls(motion, chosen, np.zeros(len(chosen)))
         return replace(made, values=made.read(start.pose(motion.link)))
 
@@ -61,8 +61,8 @@ class Coordinates(Value):
         """Names of the coordinates."""
         names: tuple[str, ...] = NAMES
         if self.motion.rotations.shape[1] == 1:
-            axis = _axis(self.motion)
-            plain = abs(axis @ self.motion.normal) > 1 - SAME_DIRECTION
+            axis = _find_rotation_axis(self.motion)
+            plain = abs(axis @ self.motion.normal) > 1 - DIRECTION_SINE_TOL
             names = *NAMES[:3], "phi" if plain else f"turn about {' '.join(f'{x:.3g}' for x in axis)}"
         return tuple(names[place] for place in self.places)
 
@@ -82,16 +82,18 @@ class Coordinates(Value):
         """Return the rotation since the zero configuration, and the map from the angular velocity to its rate."""
         R = X[:3, :3] @ self.motion.home[:3, :3].T
         if self.motion.rotations.shape[1] == 1:
-            angle, row = turn_about(_axis(self.motion), R)
+            angle, row = turn_about(_find_rotation_axis(self.motion), R)
             return np.array([angle]), row[None]
-        turn = logarithm(R)
-        return turn, logarithm_rate(turn)
+        turn = convert_rotations_to_vectors(R)
+        return turn, compute_rotation_vector_rate(turn)
 
     def error_and_jacobian(self, model: PinocchioModel, q: Array) -> tuple[Array, Array]:
         """Return the error (reached − desired) in characteristic lengths and radians, and its Jacobian."""
         frames, velocities = model.frames(q, (self.motion.link,))
         X, V = frames[0], velocities[0]
-        J = np.vstack([point_velocity(V, X[:3, :3] @ self.motion.point / model.length), self._turn(X)[1] @ V[3:]])
+        J = np.vstack(
+            [compute_point_velocity(V, X[:3, :3] @ self.motion.point / model.length), self._turn(X)[1] @ V[3:]]
+        )
         scale = np.where(np.array(self.places) < 3, model.length, 1.0)
         return self.apart(X) / scale, J[list(self.places)]
 
@@ -123,9 +125,9 @@ class Coordinates(Value):
         end = self._change(index, self.values[index] + span)
         came = track(start, self.motion, end)[1] if span else 0.0
         if came < 1:
-            came *= SLIDER_PART
+            came *= SLIDER_RANGE_FRACTION
         here = start
-        for step in range(1, count + 1) if came > NO_SLIDER else ():
+        for step in range(1, count + 1) if came > SLIDER_SPAN_MIN_FRACTION else ():
             aim = self._change(index, self.values[index] + came * span * step / count)
             here, arrived = track(here, self.motion, aim)
             if arrived < 1:
@@ -138,6 +140,6 @@ class Coordinates(Value):
         return replace(self, values=values)
 
 
-def _axis(motion: PlatformMotion) -> Array:
+def _find_rotation_axis(motion: PlatformMotion) -> Array:
     """Return the one axis about which a platform rotates, (3,), with the sense of phi if that rotates about it."""
     return orient_axis(motion.rotations[:, 0])

@@ -13,18 +13,18 @@ from typing import Annotated
 import numpy as np
 
 from ..errors import BadMechanism, UndefinedValue
-from ..geometry.ranks import CLEAN, largest_angle, spectra
+from ..geometry.ranks import CLEAN, compute_largest_angle, compute_matrix_spectra
 from ..geometry.vectors import Array
 from ..mechanism import Mechanism
 from ..records import ANGLE, GAP, Number, Recorded
 from ..results import Result
-from ..tolerances import FOLLOWED, RANK_GAP, SAME_RELATION, SOLVED
+from ..tolerances import CLOSURE_SOLVER_TOL, HIDDEN_ROBOT_RESIDUAL_TOL, RANK_GAP_MIN, RELATION_ANGLE_TOL
 from .configuration import ClosedConfiguration
 from .path_tracking import track_paths
 from .pinocchio_model import PinocchioModel
 from .sampling import Sample, Samples
 from .tasks import LinkPoses, PoseAndValuesTask, solve
-from .velocity_relation import VelocityRelation, relations
+from .velocity_relation import VelocityRelation, compute_relations
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,9 +87,11 @@ def check_equivalence(
         return verdict(str(error))
     active = model.actuated_indices()
     usual = [max(ranks) for ranks in zip(*(member.shown for member in members), strict=True)]
-    kept = () if all(o.by_segment for o in observation_model.observations) else _as_they_were(samples, hidden)
+    kept = (
+        () if all(o.is_segment_direction for o in observation_model.observations) else _list_kept_links(samples, hidden)
+    )
     start = float(np.linalg.norm(model.residual(model.q0)))
-    if start > FOLLOWED:
+    if start > HIDDEN_ROBOT_RESIDUAL_TOL:
         worst = start
         angle = np.pi / 2
         return verdict(f"not assembled at the zero configuration (loop {model.worst_loop(model.q0)[0]!r} misses)")
@@ -99,9 +101,9 @@ def check_equivalence(
     ]
     followed = _follow_ways(model, ways if complete else [way[::-2][::-1] for way in ways])
     start_target = observation_model.target(samples.start).of(lambda o: o.link not in blind)
-    for denser in (1, CLOSER):
+    for denser in (1, EQUIVALENCE_PATH_PARTS_COUNT):
         missed = [i for i, led in enumerate(followed) if not _has_arrived(led)]
-        again = [_between([start_target, *ways[i]], denser) for i in missed]
+        again = [_insert_targets([start_target, *ways[i]], denser) for i in missed]
         for i, led in zip(missed, _follow_ways(model, again), strict=True):
             followed[i] = led
     arrived = list[Array]()
@@ -111,15 +113,17 @@ def check_equivalence(
         arrived.append(led[0])
     if kept:
         arrived = [
-            _at_real_poses(model, q, member, way[-1], kept)
+            _place_at_real_poses(model, q, member, way[-1], kept)
             for q, member, way in zip(arrived, members, ways, strict=False)
         ]
-    reached = ClosedConfiguration.several(model, arrived, FOLLOWED)
+    reached = ClosedConfiguration.several(model, arrived, HIDDEN_ROBOT_RESIDUAL_TOL)
     rows = asked.rows_together(reached, blind)
-    hidden_relations = relations(reached, asked, rows)
+    hidden_relations = compute_relations(reached, asked, rows)
     real = [member.configuration for member in members[: len(reached)]]
     real_relations = (
-        [member.relation for member in members] if not bodies else relations(real, asked, asked.rows_together(real))
+        [member.relation for member in members]
+        if not bodies
+        else compute_relations(real, asked, asked.rows_together(real))
     )
     driven = _parametrise(
         reached, [each[asked.twist_rows :] for each in rows], observation_model.sizes, active, complete
@@ -129,24 +133,24 @@ def check_equivalence(
             angle = np.pi / 2
             return verdict(f"cannot follow the real robot: {led}")
         worst = max(worst, led[1])
-        if not led[1] <= FOLLOWED:
+        if not led[1] <= HIDDEN_ROBOT_RESIDUAL_TOL:
             angle = np.pi / 2
             return verdict(f"cannot follow the real robot: misses by {led[1]:.2g}")
         here = real[number].pose(observation_model.platform)[:3, 3]
         ours, theirs = real_relations[number], hidden_relations[number]
         gap = min(gap, theirs.gap, ours.gap)
-        angle = max(angle, largest_angle(ours.basis, theirs.basis))
-        if gap < RANK_GAP:
+        angle = max(angle, compute_largest_angle(ours.basis, theirs.basis))
+        if gap < RANK_GAP_MIN:
             return verdict(f"a rank is not clear: gap {gap:.2g}", Mismatch(ours, theirs, here))
-        if not angle <= SAME_RELATION:
-            return verdict(_difference(ours, theirs, angle), Mismatch(ours, theirs, here))
+        if not angle <= RELATION_ANGLE_TOL:
+            return verdict(_describe_difference(ours, theirs, angle), Mismatch(ours, theirs, here))
         if active and member.shown == usual and not driven[number]:
             angle = np.pi / 2
             return verdict("the virtual actuators do not parametrise the observed directions")
     return verdict("")
 
 
-CLOSER = 8
+EQUIVALENCE_PATH_PARTS_COUNT = 8
 """Number of parts between two targets of a path, for a robot that misses one of them."""
 Led = tuple[Array, float] | UndefinedValue
 """Configuration to which a robot was led, and its residual; or the observation without a value along the path."""
@@ -156,16 +160,16 @@ def _follow_ways(model: PinocchioModel, ways: Sequence[Sequence[PoseAndValuesTas
     return list(track_paths(model, ways)) if ways else []
 
 
-def _between(way: Sequence[PoseAndValuesTask], parts: int) -> list[PoseAndValuesTask]:
+def _insert_targets(way: Sequence[PoseAndValuesTask], parts: int) -> list[PoseAndValuesTask]:
     """Return a path after its first target, with so many parts between two targets."""
     return [one.between(other, part / parts) for one, other in pairwise(way) for part in range(1, parts + 1)]
 
 
 def _has_arrived(led: Led) -> bool:
-    return not isinstance(led, UndefinedValue) and led[1] <= FOLLOWED
+    return not isinstance(led, UndefinedValue) and led[1] <= HIDDEN_ROBOT_RESIDUAL_TOL
 
 
-def _as_they_were(samples: Samples, hidden: Mechanism) -> tuple[str, ...]:
+def _list_kept_links(samples: Samples, hidden: Mechanism) -> tuple[str, ...]:
     """Return the links that a hidden robot keeps with all their joints: their poses do not follow from the platform's
     pose and the observed values."""
     real = samples.model.mechanism
@@ -181,17 +185,17 @@ def _as_they_were(samples: Samples, hidden: Mechanism) -> tuple[str, ...]:
     )
 
 
-def _at_real_poses(
+def _place_at_real_poses(
     model: PinocchioModel, q: Array, member: Sample, target: PoseAndValuesTask, kept: tuple[str, ...]
 ) -> Array:
     """Return the configuration with the kept links where the real robot has them too, if it is found from one
     without."""
     poses = tuple((link, member.configuration.pose(link)) for link in kept)
-    found, residual = solve(model, q, LinkPoses(poses, target), tolerance=SOLVED)
-    return found if residual <= FOLLOWED else q
+    found, residual = solve(model, q, LinkPoses(poses, target), tolerance=CLOSURE_SOLVER_TOL)
+    return found if residual <= HIDDEN_ROBOT_RESIDUAL_TOL else q
 
 
-def _difference(ours: VelocityRelation, theirs: VelocityRelation, angle: float) -> str:
+def _describe_difference(ours: VelocityRelation, theirs: VelocityRelation, angle: float) -> str:
     if theirs.dimension != ours.dimension:
         return f"dim ρ becomes {theirs.dimension} instead of {ours.dimension}"
     return f"ρ turns by {angle:.2g} rad"
@@ -212,14 +216,14 @@ def _parametrise(
         seen = [each[start : start + size] for each in measured]
         start += size
         own = [
-            np.linalg.norm(motor @ unseen.kernel, axis=1) <= SAME_RELATION
-            for motor, unseen in zip(motors, spectra(seen, 1.0), strict=True)
+            np.linalg.norm(motor @ unseen.kernel, axis=1) <= RELATION_ANGLE_TOL
+            for motor, unseen in zip(motors, compute_matrix_spectra(seen, 1.0), strict=True)
         ]
         explained = [before | here for before, here in zip(explained, own, strict=True)]
         if complete:
-            locked = spectra([motor[here] for motor, here in zip(motors, own, strict=True)], 1.0)
+            locked = compute_matrix_spectra([motor[here] for motor, here in zip(motors, own, strict=True)], 1.0)
             found = [
-                good and bool(np.linalg.norm(here @ each.kernel) <= SAME_RELATION)
+                good and bool(np.linalg.norm(here @ each.kernel) <= RELATION_ANGLE_TOL)
                 for good, here, each in zip(found, seen, locked, strict=True)
             ]
     return [good and bool(each.all()) for good, each in zip(found, explained, strict=True)]

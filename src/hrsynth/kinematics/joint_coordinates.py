@@ -14,17 +14,17 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import BadRequest, LoopsNotClosed, PoseNotReached
-from ..geometry.ranks import range_basis
+from ..errors import BadRequest, LoopClosureFailure, PoseReachFailure
+from ..geometry.ranks import compute_range_basis
 from ..geometry.vectors import Array
 from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.pose import JointPose
 from ..records import Record, recorded
 from ..results import Value
-from ..tolerances import AS_PRINTED, CLOSED, SAME_POINT, SOLVED
-from .assembly import of_links
+from ..tolerances import CLOSURE_RESIDUAL_TOL, CLOSURE_SOLVER_TOL, POINT_DISTANCE_TOL, PRINTED_POSE_TOL
+from .assembly import build_from_link_poses
 from .configuration import ClosedConfiguration
-from .continuation import STRIDE, nearest, track
+from .continuation import CONTINUATION_STEP_MAX, find_nearest, track
 from .limits import CoordinateIntervals
 from .pinocchio_model import PinocchioModel
 from .platform_motion import PlatformMotion
@@ -34,66 +34,68 @@ COUNTED = (JointType.REVOLUTE, JointType.PRISMATIC, JointType.UNIVERSAL, JointTy
 """Return the joints that have coordinates here: a translation before a rotation, rotations in the order of the axes."""
 
 
-def counted_joints(robot: Mechanism, motors: bool = False) -> list[Joint]:
+def list_coordinate_joints(robot: Mechanism, motors: bool = False) -> list[Joint]:
     """Return the joints of a robot that have coordinates, or only its motors, in the order of the file."""
-    return [each for each in robot.joints.values() if each.type in COUNTED and (each.actuated or not motors)]
+    return [each for each in robot.joints.values() if each.type in COUNTED and (each.is_actuated or not motors)]
 
 
-def as_written(at: ClosedConfiguration) -> ClosedConfiguration | None:
+def convert_to_file_joints(at: ClosedConfiguration) -> ClosedConfiguration | None:
     """Return a configuration in the joints that the robot's file has; None if the normal form has made one joint of
     several, and the poses of the remaining links do not fit the file's joints."""
     robot = at.model.mechanism.written or at.model.mechanism
-    if all(joint.name in at.model.coordinates for joint in counted_joints(robot)):
+    if all(joint.name in at.model.coordinates for joint in list_coordinate_joints(robot)):
         return at
-    model = _model(robot, at.model.length)
+    model = _build_model(robot, at.model.length)
     kept = tuple((link, at.pose(link)) for link in robot.links if link in at.model.mechanism.links)
-    start = model.integrate(model.q0, _shared(at.model, at.q, model))
-    q, residual = solve(model, start, LinkPoses(kept), tolerance=SOLVED, iterations=100)
-    return ClosedConfiguration.of(model, q) if residual <= CLOSED else None
+    start = model.integrate(model.q0, _convert_step(at.model, at.q, model))
+    q, residual = solve(model, start, LinkPoses(kept), tolerance=CLOSURE_SOLVER_TOL, iterations=100)
+    return ClosedConfiguration.of(model, q) if residual <= CLOSURE_RESIDUAL_TOL else None
 
 
 def read_joints(at: ClosedConfiguration) -> dict[str, tuple[float, ...]]:
     """Return the coordinates of the joints of a robot, as its file has them, at a configuration of it or of its normal
     form; none if the file's joints do not fit."""
-    own = as_written(at)
+    own = convert_to_file_joints(at)
     if own is None:
         return {}
     model = own.model
     step = model.difference(model.q0, own.q)
     return {
         each.name: tuple(
-            (step[list(model.coordinates[each.name])] * _units(each, model.length) + _offset(each)).tolist()
+            (
+                step[list(model.coordinates[each.name])] * _list_units(each, model.length) + _compute_offset(each)
+            ).tolist()
         )
-        for each in counted_joints(model.mechanism)
+        for each in list_coordinate_joints(model.mechanism)
     }
 
 
 @lru_cache(maxsize=8)
-def _model(robot: Mechanism, length: float) -> PinocchioModel:
+def _build_model(robot: Mechanism, length: float) -> PinocchioModel:
     """Return the model of a robot as its file has it: made once for many configurations."""
     return PinocchioModel(robot, length)
 
 
-def _shared(one: PinocchioModel, q: Array, other: PinocchioModel) -> Array:
+def _convert_step(one: PinocchioModel, q: Array, other: PinocchioModel) -> Array:
     """Return the step (nv) from another model's zero configuration at which the R and P that it has too have the values
     of a configuration."""
     at, step = one.difference(one.q0, q), np.zeros(other.nv)
     for name, joint in one.mechanism.joints.items():
         model = other.mechanism.joints.get(name)
         if model is not None and joint.type == model.type and joint.type in COUNTED[:2]:
-            zero = (_offset(joint) - _offset(model)) / _units(joint, one.length)
+            zero = (_compute_offset(joint) - _compute_offset(model)) / _list_units(joint, one.length)
             step[other.coordinates[name][0]] = at[one.coordinates[name][0]] + zero[0]
     return step
 
 
-def _units(joint: Joint, length: float) -> Array:
+def _list_units(joint: Joint, length: float) -> Array:
     """Units of the coordinates (m, rad)."""
     if joint.type is JointType.CYLINDRICAL:
         return np.array([length, 1.0])
-    return np.full(joint.type.freedoms, length if joint.type.slides else 1.0)
+    return np.full(joint.type.freedoms, length if joint.type.has_translation else 1.0)
 
 
-def _offset(joint: Joint) -> Array:
+def _compute_offset(joint: Joint) -> Array:
     """Coordinates of the file at the zero configuration."""
     return np.zeros(joint.type.freedoms) if joint.offset is None else joint.offset
 
@@ -116,32 +118,31 @@ class JointAim(Value):
         return self if fraction == 1 else replace(self, values=self.begun + fraction * (self.values - self.begun))
 
 
-def reach_joints(start: ClosedConfiguration, motion: PlatformMotion, asked: JointPose) -> ClosedConfiguration:
+def track_to_joints(start: ClosedConfiguration, motion: PlatformMotion, asked: JointPose) -> ClosedConfiguration:
     """Return the configuration with these coordinates that small steps reach from the zero configuration ``start`` on
     its branch, all joints within their limits; coordinates that depend on others must agree with them.
 
-    Raises ``BadRequest`` for unknown joints, their number and values beyond limits, ``PoseNotReached`` if the path ends
-    before, with the joint that stops it.
-    """
-    home, name = as_written(start), start.model.mechanism.name
+    Raises ``BadRequest`` for unknown joints, their number and values beyond limits, ``PoseReachFailure`` if the path
+    ends before, with the joint that stops it."""
+    home, name = convert_to_file_joints(start), start.model.mechanism.name
     if home is None:
-        raise PoseNotReached(name, str(asked), 0.0, "", reason="the file's joints do not fit its normal form")
-    found = _lead(home, motion, _wanted(home, asked), asked)
+        raise PoseReachFailure(name, str(asked), 0.0, "", reason="the file's joints do not fit its normal form")
+    found = _lead(home, motion, _convert_requested(home, asked), asked)
     if home is start:
         return found
     try:
-        at = of_links(start.model, found.pose)
-        turns = _shared(home.model, found.q, start.model) - _shared(start.model, at.q, start.model)
+        at = build_from_link_poses(start.model, found.pose)
+        turns = _convert_step(home.model, found.q, start.model) - _convert_step(start.model, at.q, start.model)
         whole = 2 * np.pi * np.round(np.round(turns, 3) / (2 * np.pi))
         return ClosedConfiguration.of(at.model, at.model.integrate(at.q, whole))
-    except LoopsNotClosed as error:
-        raise PoseNotReached(name, str(asked), 1.0, "", reason=f"in normal form: {error}") from None
+    except LoopClosureFailure as error:
+        raise PoseReachFailure(name, str(asked), 1.0, "", reason=f"in normal form: {error}") from None
 
 
-def _wanted(home: ClosedConfiguration, asked: JointPose) -> dict[str, tuple[float, ...]]:
+def _convert_requested(home: ClosedConfiguration, asked: JointPose) -> dict[str, tuple[float, ...]]:
     """Return the coordinates by name: the requested ones, and those of motors that stay as they are."""
     robot = home.model.mechanism
-    joints = {joint.name: joint for joint in counted_joints(robot, asked.motors)}
+    joints = {joint.name: joint for joint in list_coordinate_joints(robot, asked.motors)}
     sizes = {name: joint.type.freedoms for name, joint in joints.items()}
     if asked.motors:
         robot.require_motors()
@@ -165,10 +166,10 @@ def _wanted(home: ClosedConfiguration, asked: JointPose) -> dict[str, tuple[floa
                 "/".join(map(str, values)),
                 "one number" if sizes[name] == 1 else "two numbers, as 0.1/0.2",
             )
-        if name in degrees and joints[name].type.slides:
+        if name in degrees and joints[name].type.has_translation:
             raise BadRequest(f"{robot.name}: unit of prismatic joint {name}", "degrees", "metres")
         low, high = robot.filed.get(name, (-np.inf, np.inf))
-        if not low - SAME_POINT <= min(values) <= max(values) <= high + SAME_POINT:
+        if not low - POINT_DISTANCE_TOL <= min(values) <= max(values) <= high + POINT_DISTANCE_TOL:
             told = "/".join(map(str, values))
             raise BadRequest(f"{robot.name}: {name} is beyond its limits", told, f"{low:.6g} to {high:.6g}")
     stay = {name: values for name, values in read_joints(home).items() if asked.motors and name in joints}
@@ -185,12 +186,14 @@ def _lead(
     joints = [robot.joints[name] for name in wanted]
     names = [joint.name for joint in joints for _ in range(joint.type.freedoms)]
     places = np.array([i for joint in joints for i in model.coordinates[joint.name]])
-    values = np.concatenate([(wanted[each.name] - _offset(each)) / _units(each, model.length) for each in joints])
+    values = np.concatenate(
+        [(wanted[each.name] - _compute_offset(each)) / _list_units(each, model.length) for each in joints]
+    )
     rows = np.eye(model.nv)[places] @ home.kernel()[0]
-    rank = range_basis(rows, 1.0)[1].value
+    rank = compute_range_basis(rows, 1.0)[1].value
     free = np.sort(qr(rows.T, mode="r", pivoting=True)[1][:rank])
     at_zero = model.difference(model.q0, home.q)
-    every = np.array([i for joint in counted_joints(robot) for i in model.coordinates[joint.name]])
+    every = np.array([i for joint in list_coordinate_joints(robot) for i in model.coordinates[joint.name]])
     rest = JointAim(every, at_zero[every], at_zero[every])
     stops = CoordinateIntervals.of(model, home.q)
     before, here, came = stops.margins(model, home.q), home, 0.0
@@ -198,16 +201,16 @@ def _lead(
     def past(at: ClosedConfiguration) -> dict[str, float]:
         """Return the joints that are farther beyond their limits than they were, and by how much."""
         margins = stops.margins(model, at.q).items()
-        return {joint: margin for joint, margin in margins if margin < min(before[joint], 0.0) - SAME_POINT}
+        return {joint: margin for joint, margin in margins if margin < min(before[joint], 0.0) - POINT_DISTANCE_TOL}
 
-    def refuse(stopped: str) -> PoseNotReached:
+    def refuse(stopped: str) -> PoseReachFailure:
         told = read_joints(here)
         last = ",".join(f"{joint}={'/'.join(f'{x:.6g}' for x in told[joint])}" for joint in wanted)
         way = f"; the robot follows {100 * came:.3g} % of the path from its zero configuration" * (came < 1)
-        return PoseNotReached(robot.name, str(asked), came, f"{asked.kind}:{last}", reason=stopped + way)
+        return PoseReachFailure(robot.name, str(asked), came, f"{asked.kind}:{last}", reason=stopped + way)
 
     goal = values[free]
-    pieces = max(1, int(np.ceil(np.linalg.norm(goal - at_zero[places[free]]) / STRIDE)))
+    pieces = max(1, int(np.ceil(np.linalg.norm(goal - at_zero[places[free]]) / CONTINUATION_STEP_MAX)))
     for number, ends in enumerate(pairwise(np.linspace(at_zero[places[free]], goal, pieces + 1))):
         there, part = track(here, motion, JointAim(places[free], *ends), home=rest)
         if over := past(there):
@@ -218,11 +221,11 @@ def _lead(
             held = names[free[np.argmax(np.abs(np.linalg.svd(J)[0][:, -1]))]]
             raise refuse(f"a singularity lies ahead, at which {held} stops")
     missed = np.abs(model.difference(model.q0, here.q)[places] - values)
-    if missed.max() > AS_PRINTED:
+    if missed.max() > PRINTED_POSE_TOL:
         joint = names[int(np.argmax(missed))]
         told = "/".join(f"{x:.6g}" for x in read_joints(here)[joint])
         raise refuse(f"with the other coordinates fixed {joint} is {told}")
-    there = nearest(here, JointAim(places[free], goal, goal), rest)
+    there = find_nearest(here, JointAim(places[free], goal, goal), rest)
     return here if past(there) else there
 
 
@@ -246,7 +249,7 @@ class FileCoordinates(Record, all_recorded=True):
         """Return those at a configuration."""
         robot = at.model.mechanism.written or at.model.mechanism
         found = {name: each[0] if len(each) == 1 else each for name, each in read_joints(at).items()}
-        driven = {name: value for name, value in found.items() if robot.joints[name].actuated}
+        driven = {name: value for name, value in found.items() if robot.joints[name].is_actuated}
         return cls(driven, {name: value for name, value in found.items() if name not in driven})
 
 

@@ -15,17 +15,17 @@ from typing import Any
 import numpy as np
 
 from ..geometry.balls import Field
-from ..geometry.lines import common_perpendicular, distance
+from ..geometry.lines import find_common_perpendicular, measure_line_distance
 from ..geometry.vectors import Array, cross, dot, transform
 from ..mechanism import Joint, JointType
 from ..mechanism.legs import Leg, LegDecomposition
-from ..mechanism.screws import elementary
+from ..mechanism.screws import split_elementary
 from ..mechanism.tilt_limit import TiltLimit
-from ..tolerances import SAME_GEOMETRY
+from ..tolerances import GEOMETRY_DIFFERENCE_TOL
 
-WAYS = 16
+LEG_PATHS_MAX = 16
 """Largest number of paths of one leg."""
-OBLIQUE = 1e-2
+AXIS_CROSSING_SINE_MIN = 1e-2
 """Least sine of the angle between two axes whose intersection is taken as known."""
 
 
@@ -43,12 +43,12 @@ class MotionFactor:
     limit: TiltLimit | None = None
 
     @property
-    def wrist(self) -> bool:
+    def is_spherical(self) -> bool:
         """True if it rotates about a point."""
         return self.axis is None
 
     @property
-    def turns(self) -> bool:
+    def is_rotation(self) -> bool:
         """True if it rotates about one axis."""
         return self.axis is not None and not self.slides
 
@@ -89,7 +89,7 @@ class MotionFactor:
         return replace(self, axis=None if self.axis is None else -self.axis, pair=pair, limit=limit)
 
 
-def ways(decomposition: LegDecomposition, leg: Leg) -> Iterator[tuple[MotionFactor, ...]]:
+def list_leg_paths(decomposition: LegDecomposition, leg: Leg) -> Iterator[tuple[MotionFactor, ...]]:
     """Yield the paths from the base to the link on which a leg ends, up to ``WAYS``, without those through a free
     joint; if the platform is a point, any rotation about it is their last part."""
     mechanism = decomposition.mechanism
@@ -105,22 +105,23 @@ def ways(decomposition: LegDecomposition, leg: Leg) -> Iterator[tuple[MotionFact
             if link in joint.links and joint.other(link) not in been and joint.type is not JointType.FREE:
                 beyond = joint.other(link)
                 if beyond == leg.platform_link or beyond in leg.links:
-                    yield from onward(beyond, (*been, beyond), (*parts, *_parts(joint, link)))
+                    yield from onward(beyond, (*been, beyond), (*parts, *_split_joint(joint, link)))
 
-    for way in islice(onward(mechanism.base, (mechanism.base,), ()), WAYS):
-        yield gather_parts((*way, *last), SAME_GEOMETRY * mechanism.length)
+    for way in islice(onward(mechanism.base, (mechanism.base,), ()), LEG_PATHS_MAX):
+        yield gather_parts((*way, *last), GEOMETRY_DIFFERENCE_TOL * mechanism.length)
 
 
-def _parts(joint: Joint, near: str) -> list[MotionFactor]:
+def _split_joint(joint: Joint, near: str) -> list[MotionFactor]:
     """Return a joint as parts, from one of its links."""
     seen = joint if joint.predecessor == near else joint.turned()
     point, name = np.asarray(seen.point), (joint.name,)
     one = (*name, "") if joint.type.freedoms > 1 else name
     if joint.type is JointType.SPHERICAL:
-        limit = seen.wrist if seen.wrist is not None and seen.wrist.limits else None
+        limit = seen.wrist if seen.wrist is not None and seen.wrist.is_limiting else None
         return [MotionFactor(False, point, None, name, limit=limit)]
     return [
-        MotionFactor(kind is JointType.PRISMATIC, point, axis, one) for kind, axis in elementary(joint.type, seen.axes)
+        MotionFactor(kind is JointType.PRISMATIC, point, axis, one)
+        for kind, axis in split_elementary(joint.type, seen.axes)
     ]
 
 
@@ -142,15 +143,17 @@ def _merge(one: MotionFactor, other: MotionFactor, tolerance: float) -> MotionFa
     if one.slides or other.slides:
         return None
     if one.axis is not None and other.axis is not None:
-        near, far = common_perpendicular(one.point, one.axis, other.point, other.axis)
+        near, far = find_common_perpendicular(one.point, one.axis, other.point, other.axis)
         if np.linalg.norm(far - near) > tolerance:
             return None
         sine = np.linalg.norm(cross(one.axis, other.axis))
-        if sine > OBLIQUE:
+        if sine > AXIS_CROSSING_SINE_MIN:
             return MotionFactor(False, 0.5 * (near + far), None, joints, (one.axis, other.axis))
-        return MotionFactor(False, one.point, one.axis, (*joints, "")) if sine <= SAME_GEOMETRY else None
+        return MotionFactor(False, one.point, one.axis, (*joints, "")) if sine <= GEOMETRY_DIFFERENCE_TOL else None
     wrist, turn = (one, other) if one.axis is None else (other, one)
     apart = (
-        np.linalg.norm(wrist.point - turn.point) if turn.axis is None else distance(wrist.point, turn.point, turn.axis)
+        np.linalg.norm(wrist.point - turn.point)
+        if turn.axis is None
+        else measure_line_distance(wrist.point, turn.point, turn.axis)
     )
     return MotionFactor(False, wrist.point, None, joints) if apart <= tolerance else None

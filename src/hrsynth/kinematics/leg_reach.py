@@ -8,30 +8,37 @@ from itertools import pairwise
 import numpy as np
 
 from ..errors import HrsynthError, LegMiss
-from ..geometry.gauss_newton import Damping, Residual, descend
-from ..geometry.ranks import kernel_basis
-from ..geometry.vectors import Array, inverse, transform
+from ..geometry.gauss_newton import DampingFactor, Residual, descend
+from ..geometry.ranks import compute_kernel_basis
+from ..geometry.vectors import Array, invert_pose, transform
 from ..mechanism import JointType, Mechanism
-from ..mechanism.graphs import adjacency, shortest_path
+from ..mechanism.graphs import build_adjacency, find_shortest_path
 from ..mechanism.legs import Leg, LegDecomposition, decompose
-from ..tolerances import AS_PRINTED, CLOSED, FOLLOWED, NO_NEARER, RANK_CUTOFF, SOLVED
+from ..tolerances import (
+    CLOSURE_RESIDUAL_TOL,
+    CLOSURE_SOLVER_TOL,
+    HIDDEN_ROBOT_RESIDUAL_TOL,
+    LEG_PROGRESS_MIN_FRACTION,
+    PRINTED_POSE_TOL,
+    RANK_CUTOFF_FRACTION,
+)
 from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
 from .platform_motion import PlatformMotion, PoseTask
 from .tasks import solve
 
-WAY = 10
+LEG_PATH_POINTS_COUNT = 10
 """Number of points of the path along which a leg alone is led towards a pose, so that it keeps its working mode."""
-ASIDE = 8
+LEG_REACH_RANDOM_STARTS_COUNT = 8
 """Number of random starts from which a leg that seems to miss is led again: a stretched one does not bend by itself."""
-SETTLED = 3
+LEG_REACH_WINDOW_COUNT = 3
 """Number of steps after which an error that hardly falls any more is final."""
-HOPELESS = 100.0
+LEG_REACH_EXTRAPOLATION_FRACTION = 100.0
 """Factor: so many times the gain of these steps must lead below the best error, or the start is given up."""
-DAMPING = Damping(start=1e-3, eased=0.2, least=1e-12, most=1e7)
+DAMPING = DampingFactor(start=1e-3, eased=0.2, least=1e-12, most=1e7)
 
 
-def worst_leg(model: PinocchioModel, motion: PlatformMotion, goal: PoseTask) -> LegMiss | None:
+def find_worst_leg(model: PinocchioModel, motion: PlatformMotion, goal: PoseTask) -> LegMiss | None:
     """Return the leg that alone misses a goal most, None if each leg reaches it: by its rods' lengths if that is more
     than these together, else by the error that a descent leaves.
 
@@ -42,14 +49,14 @@ def worst_leg(model: PinocchioModel, motion: PlatformMotion, goal: PoseTask) -> 
     except HrsynthError:
         return None
     short = max(
-        ((float(each[0]), most, label) for label, most, each in rod_misses(decomposition, motion, [goal])),
+        ((float(each[0]), most, label) for label, most, each in compute_rod_misses(decomposition, motion, [goal])),
         default=(0.0, 0.0, ""),
     )
     if short[0] > short[1]:
         return LegMiss(short[2], short[0], 0.0, True)
     misses = []
     for leg in decomposition.legs:
-        error = _miss(PinocchioModel(alone(decomposition, leg), model.length), motion, goal)
+        error = _compute_miss(PinocchioModel(extract_leg(decomposition, leg), model.length), motion, goal)
         lengths, angles = np.split(error, [goal.lengths])
         misses.append(
             (
@@ -58,19 +65,21 @@ def worst_leg(model: PinocchioModel, motion: PlatformMotion, goal: PoseTask) -> 
             )
         )
     size, worst = max(misses, key=lambda miss: miss[0])
-    return worst if size > FOLLOWED else None
+    return worst if size > HIDDEN_ROBOT_RESIDUAL_TOL else None
 
 
-def beyond_rods(mechanism: Mechanism, motion: PlatformMotion, goals: Sequence[PoseTask]) -> set[int]:
+def find_beyond_rods(mechanism: Mechanism, motion: PlatformMotion, goals: Sequence[PoseTask]) -> set[int]:
     """Return the indices of goals that some leg misses by its rods' lengths."""
     try:
         decomposition = decompose(mechanism)
     except HrsynthError:
         return set()
-    return {int(i) for *_, misses in rod_misses(decomposition, motion, goals) for i in np.flatnonzero(misses > 0)}
+    return {
+        int(i) for *_, misses in compute_rod_misses(decomposition, motion, goals) for i in np.flatnonzero(misses > 0)
+    }
 
 
-def rod_misses(
+def compute_rod_misses(
     decomposition: LegDecomposition, motion: PlatformMotion, goals: Sequence[PoseTask]
 ) -> Iterator[tuple[str, float, Array]]:
     """Yield for each leg its label, the sum of its rods' lengths to the platform's point, and a lower bound (n,) of its
@@ -89,8 +98,8 @@ def rod_misses(
     seen = np.array(
         [np.eye(3) if known else goal.directions.T @ goal.directions for goal, known in zip(goals, placed, strict=True)]
     ).reshape(-1, 3, 3)
-    for label, centres in _centres(decomposition, motion):
-        last = transform(inverse(motion.home), centres[-1])
+    for label, centres in _locate_centres(decomposition, motion):
+        last = transform(invert_pose(motion.home), centres[-1])
         found, lengths = np.full(len(goals), -np.inf), list[float]()
         for known, home, arm in ((np.ones_like(turned), point, motion.point), (turned, centres[-1], last)):
             rods = np.linalg.norm(np.diff([*centres, home], axis=0), axis=1)
@@ -98,11 +107,11 @@ def rod_misses(
             lengths.append(most)
             far = np.linalg.norm((seen @ (ends - centres[0])[..., None])[..., 0], axis=1)
             missed = np.maximum(far - most, np.where(placed, 2 * rods.max() - most - far, -np.inf))
-            found = np.where(known, np.maximum(found, missed - AS_PRINTED * (1 + most)), found)
+            found = np.where(known, np.maximum(found, missed - PRINTED_POSE_TOL * (1 + most)), found)
         yield label, lengths[0], found
 
 
-def _centres(decomposition: LegDecomposition, motion: PlatformMotion) -> Iterator[tuple[str, Array]]:
+def _locate_centres(decomposition: LegDecomposition, motion: PlatformMotion) -> Iterator[tuple[str, Array]]:
     """Return, for legs with such chains, the centres (n, 3) of the joints from the base to the platform."""
     mechanism = decomposition.mechanism
     centred = (JointType.REVOLUTE, JointType.UNIVERSAL, JointType.SPHERICAL)
@@ -114,13 +123,13 @@ def _centres(decomposition: LegDecomposition, motion: PlatformMotion) -> Iterato
             if joint.type in centred and within.issuperset(joint.links)
         }
         try:
-            links = shortest_path(adjacency(within, bonds), mechanism.base, motion.link)
+            links = find_shortest_path(build_adjacency(within, bonds), mechanism.base, motion.link)
         except KeyError:
             continue
         yield leg.label, np.array([bonds[frozenset(pair)].point for pair in pairwise(links)])
 
 
-def alone(decomposition: LegDecomposition, leg: Leg) -> Mechanism:
+def extract_leg(decomposition: LegDecomposition, leg: Leg) -> Mechanism:
     """Return one leg with base and platform, without the other legs."""
     mechanism = decomposition.mechanism
     kept = {mechanism.base, *decomposition.platform, *leg.links}
@@ -130,20 +139,24 @@ def alone(decomposition: LegDecomposition, leg: Leg) -> Mechanism:
     )
 
 
-def _miss(model: PinocchioModel, motion: PlatformMotion, goal: PoseTask) -> Array:
+def _compute_miss(model: PinocchioModel, motion: PlatformMotion, goal: PoseTask) -> Array:
     """Return the error of a goal that is left when the leg comes as near as its loops and the platform's motion allow:
     from zero, else from its nearest configuration."""
-    at = ClosedConfiguration.of(model, model.q0, FOLLOWED)
+    at = ClosedConfiguration.of(model, model.q0, HIDDEN_ROBOT_RESIDUAL_TOL)
     X, manner = at.pose(motion.link), motion.manner()
-    for number in range(1, WAY + 1):
-        at = _approach(at, goal.towards(X, number / WAY), manner, 200 if number == WAY else 10)
+    for number in range(1, LEG_PATH_POINTS_COUNT + 1):
+        at = _approach(
+            at, goal.towards(X, number / LEG_PATH_POINTS_COUNT), manner, 200 if number == LEG_PATH_POINTS_COUNT else 10
+        )
     least = goal.error_and_jacobian(model, at.q)[0]
     rng = np.random.default_rng(0)
-    for _ in range(ASIDE):
-        if np.linalg.norm(least) <= FOLLOWED:
+    for _ in range(LEG_REACH_RANDOM_STARTS_COUNT):
+        if np.linalg.norm(least) <= HIDDEN_ROBOT_RESIDUAL_TOL:
             break
-        q, residual = solve(model, model.integrate(at.q, rng.uniform(-1, 1, model.nv)), manner, tolerance=SOLVED)
-        if residual <= CLOSED:
+        q, residual = solve(
+            model, model.integrate(at.q, rng.uniform(-1, 1, model.nv)), manner, tolerance=CLOSURE_SOLVER_TOL
+        )
+        if residual <= CLOSURE_RESIDUAL_TOL:
             found = _approach(ClosedConfiguration.of(model, q), goal, manner, 200, float(np.linalg.norm(least)))
             least = min(
                 least, goal.error_and_jacobian(model, found.q)[0], key=lambda error: float(np.linalg.norm(error))
@@ -159,7 +172,9 @@ def _approach(
     model = at.model
 
     def tangent(at: ClosedConfiguration) -> tuple[ClosedConfiguration, Array]:
-        return at, kernel_basis(np.vstack([model.jacobian(at.q), manner.error_and_jacobian(model, at.q)[1]]), 1.0)[0]
+        return at, compute_kernel_basis(
+            np.vstack([model.jacobian(at.q), manner.error_and_jacobian(model, at.q)[1]]), 1.0
+        )[0]
 
     def evaluate(here: tuple[ClosedConfiguration, Array]) -> tuple[Array, Array]:
         error, rows = goal.error_and_jacobian(model, here[0].q)
@@ -171,8 +186,8 @@ def _approach(
         damped = np.vstack([left.J, np.sqrt(factor) * np.eye(left.J.shape[1])])
         wanted = np.append(-left.error, np.zeros(left.J.shape[1]))
         step = here[1] @ np.linalg.lstsq(damped, wanted, rcond=None)[0]
-        q, residual = solve(model, model.integrate(here[0].q, step), manner, tolerance=SOLVED)
-        return tangent(ClosedConfiguration.of(model, q)) if residual <= CLOSED else None
+        q, residual = solve(model, model.integrate(here[0].q, step), manner, tolerance=CLOSURE_SOLVER_TOL)
+        return tangent(ClosedConfiguration.of(model, q)) if residual <= CLOSURE_RESIDUAL_TOL else None
 
     sizes: list[float] = []
 
@@ -180,12 +195,12 @@ def _approach(
         if not sizes or left.size < sizes[-1]:
             sizes.append(left.size)
         # far from a goal out of reach the steps become short, as J does not contain how its rows rotate
-        won = sizes[-1 - SETTLED] - left.size if len(sizes) > SETTLED else np.inf
+        won = sizes[-1 - LEG_REACH_WINDOW_COUNT] - left.size if len(sizes) > LEG_REACH_WINDOW_COUNT else np.inf
         return (
-            won <= NO_NEARER * left.size
-            or left.size - known > HOPELESS * won
-            or left.size <= SOLVED
-            or bool(np.linalg.norm(left.J.T @ left.error) <= RANK_CUTOFF * left.size)
+            won <= LEG_PROGRESS_MIN_FRACTION * left.size
+            or left.size - known > LEG_REACH_EXTRAPOLATION_FRACTION * won
+            or left.size <= CLOSURE_SOLVER_TOL
+            or bool(np.linalg.norm(left.J.T @ left.error) <= RANK_CUTOFF_FRACTION * left.size)
         )
 
     return descend(tangent(at), evaluate, advance, DAMPING, iterations, content)[0][0]

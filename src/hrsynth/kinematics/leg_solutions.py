@@ -19,11 +19,11 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ..geometry.balls import Field, around
-from ..geometry.so3 import logarithm
-from ..geometry.vectors import Array, dot, inverse, plane_axes
+from ..geometry.balls import Field, enclose_around
+from ..geometry.so3 import convert_rotations_to_vectors
+from ..geometry.vectors import Array, build_plane_axes, dot, invert_pose
 from ..records import As, Number, Record
-from ..tolerances import OUT_OF_REACH, SAME_GEOMETRY
+from ..tolerances import GEOMETRY_DIFFERENCE_TOL, REACH_BALL_RADIUS_FRACTION
 from .leg_paths import MotionFactor
 
 
@@ -65,39 +65,45 @@ class LegEnd:
     def target(self, x: Array) -> Field:
         """Return balls around a point (3,) of the end."""
         size = self.length + float(np.abs(x).sum() + np.abs(self.D[:3, 3]).max())
-        return around(self.D[:3, :3] @ x + self.D[:3, 3], max(self.within, OUT_OF_REACH) * size)
+        return enclose_around(self.D[:3, :3] @ x + self.D[:3, 3], max(self.within, REACH_BALL_RADIUS_FRACTION) * size)
 
     def ball(self, x: Array) -> Field:
         """Return balls around a point of the mechanism, as exact as its incidences are taken."""
-        return around(x, SAME_GEOMETRY * self.length)
+        return enclose_around(x, GEOMETRY_DIFFERENCE_TOL * self.length)
 
 
-def closures(way: Sequence[MotionFactor], end: LegEnd) -> LegSolutions:
+def solve_path(way: Sequence[MotionFactor], end: LegEnd) -> LegSolutions:
     """Return all solutions of a path, from the base or, where the end's rotation counts, from the end."""
     turning = [part for part in way if not part.slides]
     if end.turns and len(turning) == 1 and turning[0].joint is not None:
         # one part alone rotates the end: entries of D off by w change its angle by 3w at most
-        angle = float(logarithm(end.D[:3, :3]) @ turning[0].direction)
+        angle = float(convert_rotations_to_vectors(end.D[:3, :3]) @ turning[0].direction)
         return LegSolutions(
-            None, ((turning[0].joint, (*around(np.array([angle]), 3 * max(end.within, OUT_OF_REACH)),)),)
+            None,
+            (
+                (
+                    turning[0].joint,
+                    (*enclose_around(np.array([angle]), 3 * max(end.within, REACH_BALL_RADIUS_FRACTION)),),
+                ),
+            ),
         )
-    found = _closures(way, end)
+    found = _solve_from_first(way, end)
     if end.turns and found is UNDECIDED:
-        found = _closures([part.reversed() for part in way[::-1]], replace(end, D=inverse(end.D)))
+        found = _solve_from_first([part.reversed() for part in way[::-1]], replace(end, D=invert_pose(end.D)))
     return found
 
 
-def leg_closures(several: Sequence[Sequence[MotionFactor]], end: LegEnd) -> LegSolutions:
+def solve_leg(several: Sequence[Sequence[MotionFactor]], end: LegEnd) -> LegSolutions:
     """Return the solutions of all paths of a leg together: a miss of one, or values of one joint that all of them
     share."""
     known: dict[str, tuple[Any, ...]] = {}
     for way in several if np.isfinite(end.within) else ():
-        found = closures(way, end)
+        found = solve_path(way, end)
         if found.miss is not None:
             return found
         for joint, values in found.values:
             slides = any(part.slides for part in way if part.joint == joint)
-            gaps = [[_apart(one, other, slides) for other in values] for one in known.get(joint, ())]
+            gaps = [[_bound_difference(one, other, slides) for other in values] for one in known.get(joint, ())]
             kept = tuple(one for one, row in zip(known.get(joint, ()), gaps, strict=True) if min(row) <= 0)
             if gaps and not kept:
                 return LegSolutions(
@@ -111,7 +117,7 @@ def leg_closures(several: Sequence[Sequence[MotionFactor]], end: LegEnd) -> LegS
     return LegSolutions(None, tuple(known.items()))
 
 
-def _apart(one: Any, other: Any, slides: bool) -> float:
+def _bound_difference(one: Any, other: Any, slides: bool) -> float:
     """Return a lower bound of the difference of two values, of rotations modulo 2π; 0 if they may be the same."""
     from flint import arb
 
@@ -121,22 +127,26 @@ def _apart(one: Any, other: Any, slides: bool) -> float:
     return float(gap.abs_lower()) if gap.is_finite() else 0.0
 
 
-def _closures(way: Sequence[MotionFactor], end: LegEnd) -> LegSolutions:
+def _solve_from_first(way: Sequence[MotionFactor], end: LegEnd) -> LegSolutions:
     """Return the solutions of a path from its first part."""
     if len(way) not in (2, 3) or way[-1].slides:
         return UNDECIDED
     first, last = way[0], way[-1]
-    moving = way[1] if len(way) == 3 and not way[1].wrist else None
+    moving = way[1] if len(way) == 3 and not way[1].is_spherical else None
     far = [last.point] if last.axis is None else [last.point, last.point + end.length * last.axis]
     targets = [end.target(x) for x in far]
     if len(way) == 2 or moving is not None:
-        laws = [law for x, T in zip(far, targets, strict=True) for law in _kept_laws(first, moving, last, x, T, end)]
+        laws = [
+            law
+            for x, T in zip(far, targets, strict=True)
+            for law in _list_invariant_laws(first, moving, last, x, T, end)
+        ]
         return _solve_laws(laws, first, moving, far[0], targets[0], end)
     B = way[1].point
-    rods = [_square(end.ball(B) - x) for x in far]
+    rods = [_compute_square(end.ball(B) - x) for x in far]
     if first.axis is not None:
         words = f"the rod from {_name(way[1])} to {_name(last)} is {{sought}} long, not {{span}}"
-        laws = [_distance(first, end.ball(B), T, rod, words) for T, rod in zip(targets, rods, strict=True)]
+        laws = [_make_distance_law(first, end.ball(B), T, rod, words) for T, rod in zip(targets, rods, strict=True)]
         # from the first part, the rod's far end must be where the U between them can bring it
         return _solve_laws(
             laws,
@@ -145,15 +155,16 @@ def _closures(way: Sequence[MotionFactor], end: LegEnd) -> LegSolutions:
             B,
             targets[0],
             end,
-            lambda q: _tilt_misses(way[1], end.ball(far[0]), first.moved(targets[0], -q)),
+            lambda q: _prove_tilt_failure(way[1], end.ball(far[0]), first.moved(targets[0], -q)),
         )
     if last.axis is not None:
         return UNDECIDED
     # two rods between three centres: |AB| − |BC| ≤ |AC| ≤ |AB| + |BC|
     reach, one, other = (
-        _root(_square(v)) for v in (targets[0] - first.point, end.ball(B) - first.point, end.ball(B) - far[0])
+        _compute_root(_compute_square(v))
+        for v in (targets[0] - first.point, end.ball(B) - first.point, end.ball(B) - far[0])
     )
-    return LegSolutions(_miss_outside(abs(one - other), one + other, reach, _far(first, last)))
+    return LegSolutions(_prove_outside(abs(one - other), one + other, reach, _describe_distance(first, last)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,13 +187,18 @@ class _Law:
     @property
     def swing(self) -> Any:
         """Largest change of the left side by a rotation."""
-        return _root(self.alpha * self.alpha + self.beta * self.beta)
+        return _compute_root(self.alpha * self.alpha + self.beta * self.beta)
 
     def prove_miss(self, low: Any, high: Any | None) -> ReachFailure | None:
         """Return the proof that the value is outside of an interval of the left side (None: no upper bound)."""
         if self.squared:
-            return _miss_outside(_root(low), None if high is None else _root(high), _root(self.wanted), self.words)
-        return _miss_outside(low, high, self.wanted, self.words)
+            return _prove_outside(
+                _compute_root(low),
+                None if high is None else _compute_root(high),
+                _compute_root(self.wanted),
+                self.words,
+            )
+        return _prove_outside(low, high, self.wanted, self.words)
 
     def miss(self) -> ReachFailure | None:
         """Proof that no q is a solution, if there is one."""
@@ -202,51 +218,61 @@ class _Law:
             middle = arb.atan2(self.beta, self.alpha)
             if not self.swing > 0 or not middle.is_finite():
                 return []
-            half = _acos(rest / self.swing)
+            half = _compute_arccos(rest / self.swing)
             return [middle + half, middle - half]
         if not self.beta > 0:
             return [] if self.alpha.contains(0) else [rest / self.alpha]
-        half = _root(self.alpha * self.alpha / 4 + rest)
+        half = _compute_root(self.alpha * self.alpha / 4 + rest)
         return [half - self.alpha / 2, -half - self.alpha / 2]
 
 
-def _kept_laws(
+def _list_invariant_laws(
     first: MotionFactor, moving: MotionFactor | None, last: MotionFactor, x: Array, target: Field, end: LegEnd
 ) -> list[_Law]:
     """Return the laws of the first part for a point x of the last that ``moving`` moves to the target."""
     if first.axis is not None and first.slides:
         words = f"{_name(last)} would be at {{sought}} across the rail {_name(first)}, and reaches {{span}}"
-        return [_height(moving, end.ball(x), normal, target, words) for normal in plane_axes(first.axis)]
-    square = _square(target - end.ball(first.point))
-    laws = [_distance(moving, end.ball(x), end.ball(first.point), square, _far(first, last))]
+        return [_make_height_law(moving, end.ball(x), normal, target, words) for normal in build_plane_axes(first.axis)]
+    square = _compute_square(target - end.ball(first.point))
+    laws = [_make_distance_law(moving, end.ball(x), end.ball(first.point), square, _describe_distance(first, last))]
     if first.axis is not None:
         words = f"{_name(last)} would be at {{sought}} along the axis of {_name(first)}, and reaches {{span}}"
-        laws.append(_height(moving, end.ball(x), first.axis, target, words, first.point))
+        laws.append(_make_height_law(moving, end.ball(x), first.axis, target, words, first.point))
     return laws
 
 
-def _distance(moving: MotionFactor | None, x: Field, A: Field, square: Any, words: str) -> _Law:
+def _make_distance_law(moving: MotionFactor | None, x: Field, A: Field, square: Any, words: str) -> _Law:
     """|x(q) − A|² = square."""
     from flint import arb
 
     if moving is None or moving.slides:
-        along = arb(0) if moving is None else 2 * _dot(x - A, moving.direction)
-        return _Law(_square(x - A), along, arb(0 if moving is None else 1), square, False, True, words)
+        along = arb(0) if moving is None else 2 * _compute_dot(x - A, moving.direction)
+        return _Law(_compute_square(x - A), along, arb(0 if moving is None else 1), square, False, True, words)
     centre, v, w = moving.circle(x)
     C = centre - A
-    return _Law(_square(C) + _square(v), 2 * _dot(C, v), 2 * _dot(C, w), square, True, True, words)
+    return _Law(
+        _compute_square(C) + _compute_square(v),
+        2 * _compute_dot(C, v),
+        2 * _compute_dot(C, w),
+        square,
+        True,
+        True,
+        words,
+    )
 
 
-def _height(moving: MotionFactor | None, x: Field, n: Array, target: Field, words: str, A: Array = ORIGIN) -> _Law:
+def _make_height_law(
+    moving: MotionFactor | None, x: Field, n: Array, target: Field, words: str, A: Array = ORIGIN
+) -> _Law:
     """n·(x(q) − A) = n·(target − A)."""
     from flint import arb
 
-    wanted = _dot(target - A, n)
+    wanted = _compute_dot(target - A, n)
     if moving is None or moving.slides:
         along = 0.0 if moving is None or moving.axis is None else float(n @ moving.axis)
-        return _Law(_dot(x - A, n), arb(along, SAME_GEOMETRY), arb(0), wanted, False, False, words)
+        return _Law(_compute_dot(x - A, n), arb(along, GEOMETRY_DIFFERENCE_TOL), arb(0), wanted, False, False, words)
     centre, v, w = moving.circle(x)
-    return _Law(_dot(centre - A, n), _dot(v, n), _dot(w, n), wanted, True, False, words)
+    return _Law(_compute_dot(centre - A, n), _compute_dot(v, n), _compute_dot(w, n), wanted, True, False, words)
 
 
 def _solve_laws(
@@ -269,7 +295,7 @@ def _solve_laws(
     sharpest = min(lists, key=lambda roots: max(float(root.rad()) for root in roots))
     failed = [
         [miss for law in laws if (miss := law.prove_miss(law.at(q), law.at(q))) is not None]
-        + _tilt_misses(first, moving.moved(end.ball(x), q), target)
+        + _prove_tilt_failure(first, moving.moved(end.ball(x), q), target)
         + more(q)
         for q in sharpest
     ]
@@ -279,34 +305,36 @@ def _solve_laws(
         return LegSolutions(min(worst, key=lambda miss: miss.by))
     found = [] if moving.joint is None else [(moving.joint, values)]
     if first is not None and first.joint is not None:
-        found.append((first.joint, tuple(_carrying_value(first, moving.moved(end.ball(x), q), target) for q in values)))
+        found.append(
+            (first.joint, tuple(_find_carrying_value(first, moving.moved(end.ball(x), q), target) for q in values))
+        )
     return LegSolutions(None, tuple(found))
 
 
-def _tilt_misses(first: MotionFactor | None, x: Field, target: Field) -> list[ReachFailure]:
+def _prove_tilt_failure(first: MotionFactor | None, x: Field, target: Field) -> list[ReachFailure]:
     """Return the proof that a U cannot bring x to the target: a rotation about its second axis must give x the target's
     height along the first."""
     if first is None or first.pair is None:
         return []
     outer, inner = first.pair
     words = f"its far end would be at {{sought}} along the first axis of {_name(first)}, and reaches {{span}}"
-    miss = _height(MotionFactor(False, first.point, inner, ()), x, outer, target, words).miss()
+    miss = _make_height_law(MotionFactor(False, first.point, inner, ()), x, outer, target, words).miss()
     return [] if miss is None else [miss]
 
 
-def _carrying_value(first: MotionFactor, x: Field, target: Field) -> Any:
+def _find_carrying_value(first: MotionFactor, x: Field, target: Field) -> Any:
     """Return the value with which a part brings x to the target."""
     from flint import arb
 
     if first.slides:
-        return _dot(target - x, first.direction)
+        return _compute_dot(target - x, first.direction)
     _, v, w = first.circle(x)
-    sine, cosine = _dot(w, target - first.point), _dot(v, target - first.point)
+    sine, cosine = _compute_dot(w, target - first.point), _compute_dot(v, target - first.point)
     # a ball across atan2's cut would be a whole turn
     return arb.atan2(sine, cosine) if cosine > 0 else arb.pi() + arb.atan2(-sine, -cosine)
 
 
-def _miss_outside(low: Any, high: Any | None, wanted: Any, words: str) -> ReachFailure | None:
+def _prove_outside(low: Any, high: Any | None, wanted: Any, words: str) -> ReachFailure | None:
     """Return the proof that a ball is outside of an interval between balls; ``words`` have places for both."""
     by = max(float((low - wanted).lower()), -1.0 if high is None else float((wanted - high).lower()))
     if not by > 0:
@@ -316,7 +344,7 @@ def _miss_outside(low: Any, high: Any | None, wanted: Any, words: str) -> ReachF
     return ReachFailure(words.format(sought=f"{sought} m", span=f"{span} m"), by)
 
 
-def _far(one: MotionFactor, other: MotionFactor) -> str:
+def _describe_distance(one: MotionFactor, other: MotionFactor) -> str:
     return f"{_name(other)} would be {{sought}} from {_name(one)}, and reaches {{span}}"
 
 
@@ -324,15 +352,15 @@ def _name(part: MotionFactor) -> str:
     return part.joints[0] if part.joints else "its end"
 
 
-def _dot(a: Field, b: Field) -> Any:
+def _compute_dot(a: Field, b: Field) -> Any:
     return dot(a, b).item()
 
 
-def _square(v: Field) -> Any:
-    return _dot(v, v)
+def _compute_square(v: Field) -> Any:
+    return _compute_dot(v, v)
 
 
-def _root(x: Any) -> Any:
+def _compute_root(x: Any) -> Any:
     """Return √ of the part of a ball that is not negative."""
     from flint import arb
 
@@ -340,7 +368,7 @@ def _root(x: Any) -> Any:
     return low.union(high)
 
 
-def _acos(x: Any) -> Any:
+def _compute_arccos(x: Any) -> Any:
     """Return arccos of the part of a ball within [−1, 1]."""
     from flint import arb
 

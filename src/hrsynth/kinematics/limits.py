@@ -11,18 +11,18 @@ from typing import Any
 import numpy as np
 
 from ..geometry import lines
-from ..geometry.balls import Field, around
+from ..geometry.balls import Field, enclose_around
 from ..geometry.vectors import Array, dot
 from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.tilt_limit import TiltLimit
-from ..tolerances import OUT_OF_REACH, SAME_GEOMETRY, SAME_POINT
+from ..tolerances import GEOMETRY_DIFFERENCE_TOL, POINT_DISTANCE_TOL, REACH_BALL_RADIUS_FRACTION
 from .configuration import ClosedConfiguration
 from .leg_paths import MotionFactor
 from .pinocchio_model import PinocchioModel
 
 SINGLE = (JointType.REVOLUTE, JointType.PRISMATIC)
 """Joints with one coordinate that may have limits."""
-AT_END = 1e-2
+TILT_LIMIT_END_TOL_RAD = 1e-2
 """Angle (rad) from the end of a tilt limit within which it is named where a path ends."""
 
 
@@ -38,9 +38,9 @@ class CoordinateIntervals:
     def of(cls, model: PinocchioModel, q: Array) -> CoordinateIntervals:
         """Return the intervals of a path that begins at q."""
         stops, joints, spans = model.mechanism.stops, model.mechanism.joints, dict[str, tuple[float, float]]()
-        for name, value in coordinates(model, q).items():
+        for name, value in list_limited_coordinates(model, q).items():
             joint, _, *span = stops[name]
-            spans[name] = (span[0], span[1]) if joints[joint].type.slides else _about(value, *span)
+            spans[name] = (span[0], span[1]) if joints[joint].type.has_translation else _shift_interval(value, *span)
         return cls(spans)
 
     def margins(self, model: PinocchioModel, q: Array) -> dict[str, float]:
@@ -48,16 +48,16 @@ class CoordinateIntervals:
         it."""
         found = {
             name: min(value - lower, upper - value)
-            for name, value in coordinates(model, q).items()
+            for name, value in list_limited_coordinates(model, q).items()
             for lower, upper in (self.spans[name],)
         }
-        return found | wrist_margins(model, q)
+        return found | compute_tilt_margins(model, q)
 
 
-def _about(value: float, lower: float, upper: float) -> tuple[float, float]:
+def _shift_interval(value: float, lower: float, upper: float) -> tuple[float, float]:
     """Return the interval of a rotation, shifted by the whole turns that bring it nearest to a value; by none if it
     contains it."""
-    if lower - SAME_POINT <= value <= upper + SAME_POINT:
+    if lower - POINT_DISTANCE_TOL <= value <= upper + POINT_DISTANCE_TOL:
         return lower, upper
     turn = 2 * np.pi
     beyond = turn * np.floor((value - lower) / turn) if np.isfinite(lower) else turn * np.ceil((value - upper) / turn)
@@ -66,52 +66,55 @@ def _about(value: float, lower: float, upper: float) -> tuple[float, float]:
     return lower + shift, upper + shift
 
 
-def coordinates(model: PinocchioModel, q: Array) -> dict[str, float]:
+def list_limited_coordinates(model: PinocchioModel, q: Array) -> dict[str, float]:
     """Return the coordinate (m, rad) of each R or P that has limits, by the name that it has in the file."""
     step, joints = model.difference(model.q0, q), model.mechanism.joints
     return {
-        name: float(step[model.coordinates[joint][place]]) * (model.length if joints[joint].type.slides else 1.0)
+        name: float(step[model.coordinates[joint][place]])
+        * (model.length if joints[joint].type.has_translation else 1.0)
         for name, (joint, place, *_) in model.mechanism.stops.items()
         if joint in model.coordinates and (joints[joint].type in SINGLE or joints[joint].turns)
     }
 
 
-def wrist_margins(model: PinocchioModel, q: Array) -> dict[str, float]:
+def compute_tilt_margins(model: PinocchioModel, q: Array) -> dict[str, float]:
     """Return the distance of each tilt from the nearer end of its interval (rad); negative beyond it."""
-    return {name: _carried(model, q, name, wrist).margin() for name, wrist in model.mechanism.tilt_limits.items()}
+    return {
+        name: _move_tilt_limit(model, q, name, wrist).margin() for name, wrist in model.mechanism.tilt_limits.items()
+    }
 
 
-def flat_wrists(model: PinocchioModel, q: Array) -> dict[str, float]:
+def find_flat_tilts(model: PinocchioModel, q: Array) -> dict[str, float]:
     """Return the spherical joints that stand for several R whose axes are nearly in a plane, where they rotate in two
     ways only, and their angle from it (rad)."""
     every = {
-        name: _carried(model, q, name, joint.wrist).flatness()
+        name: _move_tilt_limit(model, q, name, joint.wrist).flatness()
         for name, joint in model.mechanism.joints.items()
         if joint.wrist is not None
     }
-    return {name: flatness for name, flatness in every.items() if flatness < AT_END}
+    return {name: flatness for name, flatness in every.items() if flatness < TILT_LIMIT_END_TOL_RAD}
 
 
-def _carried(model: PinocchioModel, q: Array, name: str, wrist: TiltLimit) -> TiltLimit:
+def _move_tilt_limit(model: PinocchioModel, q: Array, name: str, wrist: TiltLimit) -> TiltLimit:
     mechanism = model.mechanism
     return wrist.carried(
         *(model.pose(q, link)[:3, :3] @ mechanism.links[link].pose[:3, :3].T for link in mechanism.joints[name].links)
     )
 
 
-def wrists_beyond(model: PinocchioModel, q: Array) -> list[str]:
+def list_tilts_beyond(model: PinocchioModel, q: Array) -> list[str]:
     """Return the tilt limits that exclude the rotation of their joint."""
-    return [name for name, margin in wrist_margins(model, q).items() if margin < -SAME_POINT]
+    return [name for name, margin in compute_tilt_margins(model, q).items() if margin < -POINT_DISTANCE_TOL]
 
 
-def outside(model: PinocchioModel, q: Array, joints: Sequence[str] | None = None) -> list[str]:
+def list_joints_beyond(model: PinocchioModel, q: Array, joints: Sequence[str] | None = None) -> list[str]:
     """Return the joints (default: of all), rotating or translating about one axis, whose coordinates are outside their
     limits (rotations modulo 2π), and the tilt limits that are exceeded."""
     mechanism = model.mechanism
     joints = [*mechanism.joints] if joints is None else joints
-    return [name for name in wrists_beyond(model, q) if name in joints] + [
+    return [name for name in list_tilts_beyond(model, q) if name in joints] + [
         name
-        for name, value in coordinates(model, q).items()
+        for name, value in list_limited_coordinates(model, q).items()
         if mechanism.stops[name].joint in joints and is_excluded(mechanism, name, value, value)
     ]
 
@@ -120,7 +123,7 @@ def is_proved_outside(model: PinocchioModel, q: Array, bodies: Iterable[str], wi
     """Return True if a joint has one value only, up to whole turns, and is beyond its limits: it joins two of these
     links, whose poses are known to ``within`` (characteristic lengths, radians), or links that two parallel R join to
     them."""
-    mechanism, within = model.mechanism, max(within, OUT_OF_REACH)
+    mechanism, within = model.mechanism, max(within, REACH_BALL_RADIUS_FRACTION)
     doubts = dict.fromkeys(bodies, (within * model.length, within))
 
     def doubt(joint: Joint, link: str) -> float:
@@ -135,17 +138,21 @@ def is_proved_outside(model: PinocchioModel, q: Array, bodies: Iterable[str], wi
             if joint.type is JointType.REVOLUTE and joint.other(link) in doubts
         ]
         for one, other in combinations(hinges, 2):
-            apart = lines.distance(other.point, one.point, one.axis)
-            if lines.parallel(one.axis, other.axis) and apart > SAME_POINT * model.length:
+            apart = lines.measure_line_distance(other.point, one.point, one.axis)
+            if lines.is_parallel(one.axis, other.axis) and apart > POINT_DISTANCE_TOL * model.length:
                 ends = [doubt(joint, joint.other(link)) for joint in (one, other)]
                 turn = 2 * sum(ends) / apart + doubts[one.other(link)][1]
                 arm = float(np.linalg.norm(mechanism.links[link].pose[:3, 3] - one.point))
                 doubts[link] = ends[0] + turn * arm, turn
-    for name, value in coordinates(model, q).items():
+    for name, value in list_limited_coordinates(model, q).items():
         joint = mechanism.joints[mechanism.stops[name].joint]
         if all(link in doubts for link in joint.links):
             turn = sum(doubts[link][1] for link in joint.links)
-            error = sum(doubt(joint, link) for link in joint.links) + turn * abs(value) if joint.type.slides else turn
+            error = (
+                sum(doubt(joint, link) for link in joint.links) + turn * abs(value)
+                if joint.type.has_translation
+                else turn
+            )
             if is_excluded(mechanism, name, value - error, value + error):
                 return True
     return False
@@ -156,15 +163,15 @@ def is_excluded(mechanism: Mechanism, joint: str, low: float, high: float) -> bo
     if joint not in mechanism.stops:
         return False
     stop = mechanism.stops[joint]
-    lower, upper = stop.lower - SAME_POINT, stop.upper + SAME_POINT
-    if mechanism.joints[stop.joint].type.slides:
+    lower, upper = stop.lower - POINT_DISTANCE_TOL, stop.upper + POINT_DISTANCE_TOL
+    if mechanism.joints[stop.joint].type.has_translation:
         return high < lower or low > upper
     # the smallest turn 2πk that brings ``high`` to the lower limit must take ``low`` beyond the upper one
     turns = np.ceil((lower - high) / (2 * np.pi)) if np.isfinite(lower) else -np.inf
     return bool(low + 2 * np.pi * turns > upper)
 
 
-def all_excluded(mechanism: Mechanism, joint: str, values: Sequence[Any]) -> bool:
+def is_every_value_excluded(mechanism: Mechanism, joint: str, values: Sequence[Any]) -> bool:
     """Return True if all values of a list, as balls, are outside a joint's limits."""
     return all(
         value.is_finite() and is_excluded(mechanism, joint, float(value.lower()), float(value.upper()))
@@ -172,10 +179,10 @@ def all_excluded(mechanism: Mechanism, joint: str, values: Sequence[Any]) -> boo
     )
 
 
-def at_end(at: ClosedConfiguration) -> str | None:
+def find_tilt_at_end(at: ClosedConfiguration) -> str | None:
     """Return the tilt limit nearest to an end of its interval, if it is there."""
-    name, margin = min(wrist_margins(at.model, at.q).items(), key=lambda item: item[1], default=(None, np.inf))
-    return name if margin < AT_END else None
+    name, margin = min(compute_tilt_margins(at.model, at.q).items(), key=lambda item: item[1], default=(None, np.inf))
+    return name if margin < TILT_LIMIT_END_TOL_RAD else None
 
 
 def is_tilt_excluded(
@@ -190,18 +197,20 @@ def is_tilt_excluded(
         return False
     before, wrist, after = parts[: places[0]], parts[places[0]].limit, parts[places[0] + 1 :]
     assert wrist is not None
-    end = around(D[:3, :3], max(within, OUT_OF_REACH))
+    end = enclose_around(D[:3, :3], max(within, REACH_BALL_RADIUS_FRACTION))
     lists = [values[str(part.joint)] for part in (*before, *after)]
     closures = zip(*lists, strict=True) if alone and lists else product(*lists)
-    return all(_outside(wrist, _cosine(wrist, before, after, turns, end)) for turns in closures)
+    return all(
+        _is_beyond_tilt_limit(wrist, _enclose_tilt_cosine(wrist, before, after, turns, end)) for turns in closures
+    )
 
 
-def _cosine(
+def _enclose_tilt_cosine(
     wrist: TiltLimit, before: Sequence[MotionFactor], after: Sequence[MotionFactor], turns: Sequence[Any], end: Field
 ) -> Any:
     """Return E_1 … E_k first · D E_n⁻¹ … E_l⁻¹ last, for the parts before and after the tilted joint rotated by
     ``turns``."""
-    first, last = (around(axis, SAME_GEOMETRY) for axis in (wrist.first, wrist.last))
+    first, last = (enclose_around(axis, GEOMETRY_DIFFERENCE_TOL) for axis in (wrist.first, wrist.last))
     for part, q in reversed(list(zip(before, turns, strict=False))):
         first = part.rotated(first, q)
     for part, q in zip(after, turns[len(before) :], strict=True):
@@ -209,9 +218,9 @@ def _cosine(
     return dot(first, dot(end, last))[()]
 
 
-def _outside(wrist: TiltLimit, cosine: Any) -> bool:
+def _is_beyond_tilt_limit(wrist: TiltLimit, cosine: Any) -> bool:
     """Return True if a tilt limit is exceeded, by a ball of the cosine."""
     return bool(
-        (wrist.upper is not None and cosine < np.cos(wrist.upper) - SAME_POINT)
-        or (wrist.lower is not None and cosine > np.cos(wrist.lower) + SAME_POINT)
+        (wrist.upper is not None and cosine < np.cos(wrist.upper) - POINT_DISTANCE_TOL)
+        or (wrist.lower is not None and cosine > np.cos(wrist.lower) + POINT_DISTANCE_TOL)
     )

@@ -15,13 +15,13 @@ import numpy as np
 
 from ..description.assembly.loops import SINGLE
 from ..description.assembly.zero_configuration import zeroed_at
-from ..geometry.ranks import kernel_basis, range_bases, range_basis, spectra
-from ..geometry.screws import point_velocity
+from ..geometry.ranks import compute_kernel_basis, compute_matrix_spectra, compute_range_bases, compute_range_basis
+from ..geometry.screws import compute_point_velocity
 from ..geometry.vectors import Array, hat
 from ..mechanism import Coupling, Joint, Mechanism, Observation
 from ..mechanism.legs import Leg
-from ..mechanism.screws import constraints
-from ..tolerances import INVERTED
+from ..mechanism.screws import build_constraint_matrix
+from ..tolerances import PSEUDOINVERSE_CUTOFF_FRACTION
 from .configuration import ClosedConfiguration
 from .velocity_relation import ObservationModel
 
@@ -33,7 +33,7 @@ class _Bodies:
         self.at = at
         self.place = {link: i for i, link in enumerate(links)}
         pose = cache(at.pose)
-        self.A = constraints(joints, self.place, lambda joint: joint_at(at, joint, pose))
+        self.A = build_constraint_matrix(joints, self.place, lambda joint: locate_joint(at, joint, pose))
         gears = [each for each in at.model.mechanism.couplings if {each.predecessor, each.successor} <= {*links}]
         self.A = np.vstack([self.A, *(self._coupling_row(each, pose) for each in gears)])
 
@@ -42,7 +42,7 @@ class _Bodies:
         row, mechanism = np.zeros((1, 6 * len(self.place))), self.at.model.mechanism
         for link, factor in ((coupling.successor, 1.0), (coupling.predecessor, -coupling.ratio)):
             joint = mechanism.carrier(coupling, link)
-            (axis,), slides = joint_at(self.at, joint, pose)[1], joint.type.slides
+            (axis,), slides = locate_joint(self.at, joint, pose)[1], joint.type.has_translation
             part = np.r_[axis * self.at.model.length, 0 * axis] if slides else np.r_[0 * axis, axis]
             for end, sign in ((joint.successor, factor), (joint.predecessor, -factor)):
                 if end in self.place:
@@ -77,43 +77,47 @@ class _Bodies:
         return np.vstack(found)
 
 
-def leg_twists(at: ClosedConfiguration, leg: Leg, locks: Sequence[Observation], reference: str) -> Array:
+def compute_leg_twists(at: ClosedConfiguration, leg: Leg, locks: Sequence[Observation], reference: str) -> Array:
     """Return an orthonormal basis (6, k) of T_i: the twists of the link on which the leg ends that its joints and fixed
     measured values allow. Raises ``ValueError`` if an observation is from a link outside the leg."""
-    return leg_twists_together([at], leg, locks, reference)[0]
+    return compute_twists_at_samples([at], leg, locks, reference)[0]
 
 
-def leg_twists_together(
+def compute_twists_at_samples(
     samples: Sequence[ClosedConfiguration], leg: Leg, locks: Sequence[Observation], reference: str
 ) -> list[Array]:
-    """:func:`leg_twists` at several configurations."""
+    """:func:`compute_leg_twists` at several configurations."""
     mechanism, rows = samples[0].model.mechanism, []
     links = (leg.platform_link, *(link for link in leg.links if link not in (leg.platform_link, mechanism.base)))
     for at in samples:
         bodies = _Bodies(at, links, [mechanism.joints[name] for name in leg.joints])
         rows.append(np.vstack([bodies.A, bodies.rates(locks, reference)]))
-    return [basis for basis, _ in range_bases([found.kernel[:6] for found in spectra(rows)], 1.0)]
+    return [
+        basis for basis, _ in compute_range_bases([found.kernel[:6] for found in compute_matrix_spectra(rows)], 1.0)
+    ]
 
 
-def interaction(at: ClosedConfiguration, observation_model: ObservationModel) -> Array:
+def compute_interaction(at: ClosedConfiguration, observation_model: ObservationModel) -> Array:
     """Return Mᵀ on an orthonormal basis of the platform's twists, (rows, d), by the screws of all joints: u̇ = Mᵀ x. If
     observed links move while the platform is fixed, that part of u̇ is left out."""
     mechanism = at.model.mechanism
     links = [link for link in mechanism.links if link != mechanism.base]
     bodies = _Bodies(at, links, list(mechanism.joints.values()))
-    kernel, _ = kernel_basis(bodies.A)
+    kernel, _ = compute_kernel_basis(bodies.A)
     V = bodies.velocity(observation_model.platform)
     if observation_model.point is not None:
-        V = point_velocity(V, at.pose(observation_model.platform)[:3, :3] @ observation_model.point / at.model.length)
+        V = compute_point_velocity(
+            V, at.pose(observation_model.platform)[:3, :3] @ observation_model.point / at.model.length
+        )
     moving, rates = V @ kernel, bodies.rates(observation_model.observations, observation_model.reference) @ kernel
-    still, _ = kernel_basis(moving, 1.0)
-    hidden = range_basis(rates @ still, 1.0)[0] if still.shape[1] else np.zeros((len(rates), 0))
-    basis, _ = range_basis(moving, 1.0)
-    found: Array = rates @ np.linalg.pinv(basis.T @ moving, rcond=INVERTED)
+    still, _ = compute_kernel_basis(moving, 1.0)
+    hidden = compute_range_basis(rates @ still, 1.0)[0] if still.shape[1] else np.zeros((len(rates), 0))
+    basis, _ = compute_range_basis(moving, 1.0)
+    found: Array = rates @ np.linalg.pinv(basis.T @ moving, rcond=PSEUDOINVERSE_CUTOFF_FRACTION)
     return found - hidden @ (hidden.T @ found)
 
 
-def joint_at(
+def locate_joint(
     at: ClosedConfiguration, joint: Joint, pose: Callable[[str], Array] | None = None
 ) -> tuple[Array, list[Array]]:
     """Return centre (characteristic lengths) and axes of a joint at a configuration, whose links are at these poses."""
@@ -129,12 +133,12 @@ def carry_joint(mechanism: Mechanism, joint: Joint, pose: Callable[[str], Array]
     return carriers[0][:3, :3] @ joint.point + carriers[0][:3, 3], axes
 
 
-def rezero(at: ClosedConfiguration) -> Mechanism:
+def set_zero(at: ClosedConfiguration) -> Mechanism:
     """Return the mechanism with ``at`` as its zero configuration."""
     mechanism, model = at.model.mechanism, at.model
     step = model.difference(model.q0, at.q)
     known = {
-        name: float(step[model.coordinates[name][0]]) * (model.length if joint.type.slides else 1.0)
+        name: float(step[model.coordinates[name][0]]) * (model.length if joint.type.has_translation else 1.0)
         for name, joint in mechanism.joints.items()
         if joint.type in SINGLE and name in model.coordinates
     }
@@ -159,12 +163,15 @@ def split(twists: Array, point: Array) -> Split:
 def split_together(systems: Sequence[Array], points: Sequence[Array]) -> list[Split]:
     """:func:`split` of several systems, each at its own point."""
     there = [
-        np.vstack([point_velocity(twists, point), twists[3:]]) for twists, point in zip(systems, points, strict=True)
+        np.vstack([compute_point_velocity(twists, point), twists[3:]])
+        for twists, point in zip(systems, points, strict=True)
     ]
     parts = []
     for part, other in ((slice(3), slice(3, 6)), (slice(3, 6), slice(3))):
-        alone = spectra([twists[other] for twists in there], 1.0)
-        parts.append(range_bases([twists[part] @ each.kernel for twists, each in zip(there, alone, strict=True)], 1.0))
+        alone = compute_matrix_spectra([twists[other] for twists in there], 1.0)
+        parts.append(
+            compute_range_bases([twists[part] @ each.kernel for twists, each in zip(there, alone, strict=True)], 1.0)
+        )
     return [
         Split(moved, turned, moved.shape[1] + turned.shape[1] == twists.shape[1])
         for (moved, _), (turned, _), twists in zip(*parts, systems, strict=True)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..geometry.vectors import Array
 
 Places = NDArray[np.intp]
-SIZE = 12
+PLACEMENT_NUMBERS_COUNT = 12
 """Numbers of a placement: three axes, then the point."""
 _AXES, _POINT = np.arange(9).reshape(3, 3), np.arange(9, 12)
 _ONE, _ZERO = 0, 1
@@ -26,11 +26,11 @@ _NEXT, _LAST = [1, 2, 0], [2, 0, 1]
 _NOTHING = np.zeros(0)
 
 
-def numbers(placements: Sequence[pin.SE3]) -> Array:
+def read_numbers(placements: Sequence[pin.SE3]) -> Array:
     """The numbers of a vector of placements, (k, 12), in Pinocchio's memory: they change with it, and live as long."""
     first, last = placements[0].rotation, placements[len(placements) - 1].translation
-    shape = len(placements), SIZE
-    found = np.lib.stride_tricks.as_strided(first, shape, (SIZE * first.itemsize, first.itemsize))
+    shape = len(placements), PLACEMENT_NUMBERS_COUNT
+    found = np.lib.stride_tricks.as_strided(first, shape, (PLACEMENT_NUMBERS_COUNT * first.itemsize, first.itemsize))
     assert np.shares_memory(found[-1, 9:], last), "Pinocchio hands out copies (pinocchio.sharedMemory)"
     return found
 
@@ -61,15 +61,19 @@ class LoopRows:
                 self._missed.append(self._welds[-1][1].constraint_position_error)
                 welded += range(rows.start, rows.stop)
         starts, ends, turns = np.array(blocks, dtype=np.intp).reshape(-1, 3, 1, 1).swapaxes(0, 1)
-        axes, p1, p = SIZE * starts + _AXES, SIZE * starts + _POINT + 0 * _AXES, SIZE * ends + _POINT + 0 * _AXES
+        axes, p1, p = (
+            PLACEMENT_NUMBERS_COUNT * starts + _AXES,
+            PLACEMENT_NUMBERS_COUNT * starts + _POINT + 0 * _AXES,
+            PLACEMENT_NUMBERS_COUNT * ends + _POINT + 0 * _AXES,
+        )
         moving = np.array([axes, p[..., _NEXT], p[..., _LAST], axes[..., _LAST], axes[..., _NEXT]])
         zero, one = np.full_like(axes, _ZERO), np.full_like(axes, _ONE)
-        forces = _by_component(np.where(turns, np.array([zero, axes, zero, one, zero]), moving))
-        self._errors = _by_component(np.array([axes, p, p1]))
+        forces = _order_by_component(np.where(turns, np.array([zero, axes, zero, one, zero]), moving))
+        self._errors = _order_by_component(np.array([axes, p, p1]))
         self._welded = np.array(welded, dtype=np.intp)
-        self.numbers = numbers(data.oMf).reshape(-1)
+        self.numbers = read_numbers(data.oMf).reshape(-1)
         """Those of the placements that are there."""
-        self.jacobian = _product(self.numbers.take, forces, data.J.reshape(6, model.nv), signs)
+        self.jacobian = _prepare_product(self.numbers.take, forces, data.J.reshape(6, model.nv), signs)
         """The derivatives of the errors at closure, at the placements and screws that are there, (rows, nv)."""
 
     def errors(self) -> Array:
@@ -91,7 +95,7 @@ class LoopRows:
         return errors
 
 
-def _product(take: Callable[..., Array], forces: Places, screws: Array, signs: Array) -> Callable[[], Array]:
+def _prepare_product(take: Callable[..., Array], forces: Places, screws: Array, signs: Array) -> Callable[[], Array]:
     """Return the work of the forces at these places on the screws that move a loop's far end (sign 1) or its near end
     (−1). Constants of all calls are bound here: to look them up would take a tenth of the time."""
     parts = np.empty(forces.shape)
@@ -110,6 +114,6 @@ def _product(take: Callable[..., Array], forces: Places, screws: Array, signs: A
     return product
 
 
-def _by_component(places: Places) -> Places:
+def _order_by_component(places: Places) -> Places:
     """Places (k, blocks, 3, 3) of three components in each of three rows, as one table (k, components, rows)."""
     return np.ascontiguousarray(places.transpose(0, 3, 1, 2).reshape(len(places), 3, -1))

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from ..errors import UndefinedValue
 from ..geometry.vectors import Array
-from ..tolerances import PASSED_BY, SOLVED
+from ..tolerances import CLOSURE_SOLVER_TOL, WAYPOINT_RESIDUAL_TOL
 from .pinocchio_model import PinocchioModel
 from .tasks import PoseAndValuesTask, TaskBatch, solve_together
 
@@ -35,6 +35,6 @@ def _track_ways(
     )
     places = TaskBatch(model, stages[0][0] if stages else None)
     for targets in stages:
-        tolerance = SOLVED if targets is stages[-1] else PASSED_BY
+        tolerance = CLOSURE_SOLVER_TOL if targets is stages[-1] else WAYPOINT_RESIDUAL_TOL
         found = solve_together(places, [q for q, _ in found], targets, tolerance=tolerance, iterations=iterations)
     return found

@@ -13,14 +13,14 @@ import numpy as np
 import pinocchio as pin
 
 from ..description import load
-from ..description.chains import part_names
-from ..description.contents import content_of
-from ..description.tree import spanning
-from ..geometry.so3 import turns_about
-from ..geometry.vectors import Array, inverse, transform
+from ..description.chains import list_chain_joints
+from ..description.contents import collect_content
+from ..description.tree import build_spanning_mechanism
+from ..geometry.so3 import decompose_rotation
+from ..geometry.vectors import Array, invert_pose, transform
 from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.model import Link
-from ..mechanism.screws import elementary
+from ..mechanism.screws import split_elementary
 from ..results import with_spelling
 
 _WHOLE = {JointType.SPHERICAL: pin.JointModelSpherical, JointType.FREE: pin.JointModelFreeFlyer}
@@ -65,7 +65,7 @@ def to_pinocchio(robot: Mechanism | str | Path) -> PinocchioExport:
 
     Raises
     ------
-    BadRobotFile, LoopsNotClosed
+    BadRobotFile, LoopClosureFailure
         If the robot is not readable, or its loops do not close.
 
     Notes
@@ -81,7 +81,7 @@ def to_pinocchio(robot: Mechanism | str | Path) -> PinocchioExport:
     (9, 2)
     """
     mechanism = load(robot)
-    return _Export(mechanism, spanning(mechanism)).result()
+    return _Export(mechanism, build_spanning_mechanism(mechanism)).result()
 
 
 class _Export:
@@ -121,7 +121,7 @@ class _Export:
             ]
             constraints.append(pin.RigidConstraintModel(kind, self._model, *ends, pin.ReferenceFrame.LOCAL))
             constraints[-1].name = joint.name
-        driven = (name for name, joint in self._robot.joints.items() if joint.actuated)
+        driven = (name for name, joint in self._robot.joints.items() if joint.is_actuated)
         return PinocchioExport(
             self._model,
             constraints,
@@ -148,7 +148,7 @@ class _Export:
 
     def _add_link(self, link: Link, body: int, frame: int) -> None:
         """The frame of a link on a body, with its mass."""
-        inertia, own = pin.Inertia.Zero(), content_of(link, self._robot).inertial
+        inertia, own = pin.Inertia.Zero(), collect_content(link, self._robot).inertial
         if own is not None:
             tensor = np.zeros((3, 3)) if own.inertia is None else own.inertia
             inertia = pin.SE3(own.X).act(pin.Inertia(own.mass, np.zeros(3), tensor))
@@ -167,7 +167,7 @@ class _Export:
             q = pin.SE3ToXYZQUAT(start.actInv(D.actInv(start)))
             models = [(_WHOLE[joint.type](), q[3:] if joint.type is JointType.SPHERICAL else q, D.actInv(start))]
         else:
-            parts = list(zip(elementary(joint.type, joint.axes), _values(joint), strict=True))
+            parts = list(zip(split_elementary(joint.type, joint.axes), _list_zero_values(joint), strict=True))
             slid = sum(value * axis for (kind, axis), value in parts if kind is JointType.PRISMATIC)
             start = pin.SE3(X.rotation, joint.point + slid)
             for (kind, axis), value in reversed(parts):
@@ -176,7 +176,7 @@ class _Export:
                 model = (pin.JointModelPrismaticUnaligned if slides else pin.JointModelRevoluteUnaligned)(own)
                 models.insert(0, (model, np.array([value]), start))
                 start *= pin.SE3(np.eye(3), -value * own) if slides else pin.SE3(pin.exp3(-value * own), np.zeros(3))
-        names = [name for name, _ in joint.turns] or part_names(joint.name, len(models)) if models else []
+        names = [name for name, _ in joint.turns] or list_chain_joints(joint.name, len(models)) if models else []
         if not joint.turns:
             names = names[:: self._order(joint)]
         for name, (model, q, after) in zip(names, models, strict=True):
@@ -225,15 +225,15 @@ class _Export:
 
 def _is_ball(joint: Joint) -> bool:
     """Return True if a loop joins two points, and no motor rotates it."""
-    return joint.type is JointType.SPHERICAL and not joint.in_tree and not joint.actuated
+    return joint.type is JointType.SPHERICAL and not joint.in_tree and not joint.is_actuated
 
 
-def _values(joint: Joint) -> Array:
+def _list_zero_values(joint: Joint) -> Array:
     """The file's coordinates (m, rad) of a chain of R and P at the zero configuration."""
     if joint.offset is None:
         return np.zeros(joint.type.freedoms)
     if joint.type is not JointType.PLANAR:
         return joint.offset
-    shift = transform(inverse(joint.offset), joint.point) - joint.point
-    slides = [axis @ shift for _, axis in elementary(joint.type, joint.axes)[:2]]
-    return np.array([*slides, *turns_about(joint.axis[None], joint.offset[:3, :3].T)])
+    shift = transform(invert_pose(joint.offset), joint.point) - joint.point
+    slides = [axis @ shift for _, axis in split_elementary(joint.type, joint.axes)[:2]]
+    return np.array([*slides, *decompose_rotation(joint.axis[None], joint.offset[:3, :3].T)])

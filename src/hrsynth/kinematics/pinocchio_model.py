@@ -14,14 +14,14 @@ from functools import cached_property
 import numpy as np
 import pinocchio as pin
 
-from ..budgets import LARGEST_MODEL
+from ..budgets import MODEL_COORDINATES_MAX
 from ..errors import BadMechanism, BadRequest
-from ..geometry.so3 import logarithm, turns_about
-from ..geometry.vectors import Array, inverse, transform
+from ..geometry.so3 import convert_rotations_to_vectors, decompose_rotation
+from ..geometry.vectors import Array, invert_pose, transform
 from ..mechanism import Joint, JointType, Mechanism, graphs
-from ..mechanism.screws import elementary
-from ..tolerances import SAME_GEOMETRY
-from .loop_rows import LoopRows, Places, numbers
+from ..mechanism.screws import split_elementary
+from ..tolerances import GEOMETRY_DIFFERENCE_TOL
+from .loop_rows import LoopRows, Places, read_numbers
 
 _UPRIGHT = np.eye(3)
 _WEIGHT = {"F": 0, "R": 1, "P": 1, "C": 2, "U": 2, "E": 3, "S": 4, "6": 100}
@@ -47,15 +47,15 @@ class PinocchioModel:
         """Joints of the tree, from the base outwards, and those at which loops are cut."""
         self._gears = self._gear_rows()
         self._geared = len(self._gears) > 0
-        if self.model.nv > LARGEST_MODEL:
+        if self.model.nv > MODEL_COORDINATES_MAX:
             raise BadRequest(
-                f"{mechanism.name}: joints with {self.model.nv} coordinates", None, f"up to {LARGEST_MODEL}"
+                f"{mechanism.name}: joints with {self.model.nv} coordinates", None, f"up to {MODEL_COORDINATES_MAX}"
             )
         self.data = self.model.createData()
         self.nv: int = self.model.nv
         self.q0: Array = pin.neutral(self.model)
         self._links = {name: (self._body[name], self._pose_from_body(name)) for name in mechanism.links}
-        self._placements, self._screws = numbers(self.data.oMi), self.data.J.reshape(6, self.nv)
+        self._placements, self._screws = read_numbers(self.data.oMi), self.data.J.reshape(6, self.nv)
         self._several: dict[tuple[str, ...], tuple[Places, Array, Array]] = {}
         self._masks = {0: np.zeros(self.nv)}
         self._rows = LoopRows(self.model, self.data, ends, self._supports)
@@ -76,7 +76,7 @@ class PinocchioModel:
         file in the ring that it closes, no two by the same (the exchange of two spanning trees)."""
         tree, cuts = self.spanned
         way: dict[str, frozenset[str]] = {self.mechanism.base: frozenset()}
-        for joint, near, far in graphs.outward(self.mechanism.base, tree):
+        for joint, near, far in graphs.order_outward(self.mechanism.base, tree):
             way[far] = way[near] | {joint.name}
         rings = {
             joint.name: [
@@ -112,8 +112,8 @@ class PinocchioModel:
         geared = {link for c in mechanism.couplings for link in (c.predecessor, c.successor)}
         joints = [joint for joint in mechanism.joints.values() if joint.name not in mechanism.idle]
         weights = [_WEIGHT[joint.type.value] - (0.5 if joint.successor in geared else 0) for joint in joints]
-        tree = graphs.spanning_forest(mechanism.links, joints, weights)
-        ordered = [(joint, parent) for joint, parent, _ in graphs.outward(mechanism.base, tree)]
+        tree = graphs.build_spanning_forest(mechanism.links, joints, weights)
+        ordered = [(joint, parent) for joint, parent, _ in graphs.order_outward(mechanism.base, tree)]
         if len(ordered) != len(mechanism.links) - 1:
             reached = {mechanism.base, *(child.other(parent) for child, parent in ordered)}
             missing = sorted(set(mechanism.links) - reached)
@@ -123,7 +123,7 @@ class PinocchioModel:
                 remedy="Connect each to another link.",
             )
         used = {joint.name for joint, _ in ordered}
-        driven = ", ".join(name for name in mechanism.idle if mechanism.joints[name].actuated)
+        driven = ", ".join(name for name in mechanism.idle if mechanism.joints[name].is_actuated)
         if driven:
             raise BadMechanism(
                 f"{mechanism.name}: a motor on a floating joint whose link other joints hold",
@@ -145,7 +145,7 @@ class PinocchioModel:
                     pin.JointModelPrismaticUnaligned(axis)
                     if kind is JointType.PRISMATIC
                     else pin.JointModelRevoluteUnaligned(axis)
-                    for kind, axis in elementary(joint.type, turned.axes, across)
+                    for kind, axis in split_elementary(joint.type, turned.axes, choose_slide_direction)
                 ]
 
     def _add(self, joint: Joint, parent: str, suffix: str) -> int:
@@ -174,7 +174,7 @@ class PinocchioModel:
     def _loop(self, joint: Joint) -> tuple[int, int, bool]:
         """The two frames of a loop, and whether a ball holds their points together: one that no motor turns."""
         near, far = (self._body[link] for link in joint.links)
-        ball = joint.type is JointType.SPHERICAL and not joint.actuated
+        ball = joint.type is JointType.SPHERICAL and not joint.is_actuated
         if not ball and joint.type is not JointType.FIXED:
             near = self._add(joint, joint.predecessor, "__cut")
         point = joint.point / self.length
@@ -229,7 +229,7 @@ class PinocchioModel:
         return dict(zip((each.name for each in self.mechanism.couplings), self._gear_errors(q).tolist(), strict=True))
 
     def jacobian(self, q: Array) -> Array:
-        """The derivative of :meth:`residual` at closure, shape (rows, nv)."""
+        """The derivative of :meth:`compute_closure_residual` at closure, shape (rows, nv)."""
         self.at(q)
         J = self._rows.jacobian()
         return np.vstack([J, self._gears]) if self._geared else J
@@ -290,8 +290,8 @@ class PinocchioModel:
     def states(
         self, places: Sequence[Array], links: tuple[str, ...], whole: int | None = None
     ) -> tuple[Array, Array, Array, Array]:
-        """Return :meth:`residual` (n, rows), :meth:`jacobian` (n, rows, nv) and :meth:`frames` (n, k, 4, 4), (n, k, 6,
-        nv) of several configurations."""
+        """Return :meth:`compute_closure_residual` (n, rows), :meth:`jacobian` (n, rows, nv) and
+        :meth:`compute_image_frames` (n, k, 4, 4), (n, k, 6, nv) of several configurations."""
         bodies = (self._several.get(links) or self._together(links))[0] if links else np.zeros(0, dtype=np.intp)
         rows = self._rows
         numbers, missed, loops, J, X = [], [], [], [], []
@@ -338,25 +338,27 @@ class PinocchioModel:
 
     def read(self, pose: Callable[[str], Array]) -> Array:
         """The configuration at which all links have their poses X_BL (4, 4), m, as far as the tree's joints allow."""
-        D = {link: pose(link) @ inverse(each.pose) for link, each in self.mechanism.links.items()}
+        D = {link: pose(link) @ invert_pose(each.pose) for link, each in self.mechanism.links.items()}
         step = np.zeros(self.nv)
         for joint, parent, _ in self._parts:
             own = joint if joint.predecessor == parent else joint.turned()
             places = sorted(self.coordinates[joint.name])
-            moved = inverse(D[parent]) @ D[joint.other(parent)]
+            moved = invert_pose(D[parent]) @ D[joint.other(parent)]
             R, shift = moved[:3, :3], (transform(moved, own.point) - own.point) / self.length
             match own.type:
                 case JointType.SPHERICAL:
-                    step[places] = logarithm(R)
+                    step[places] = convert_rotations_to_vectors(R)
                 case JointType.FREE:
                     step[places] = pin.log6(pin.SE3(R, shift)).vector
                 case JointType.REVOLUTE | JointType.UNIVERSAL:
-                    step[places] = turns_about(np.array(own.axes), R)
+                    step[places] = decompose_rotation(np.array(own.axes), R)
                 case JointType.PRISMATIC | JointType.CYLINDRICAL | JointType.PLANAR:
                     slides = [
-                        axis for kind, axis in elementary(own.type, own.axes, across) if kind is JointType.PRISMATIC
+                        axis
+                        for kind, axis in split_elementary(own.type, own.axes, choose_slide_direction)
+                        if kind is JointType.PRISMATIC
                     ]
-                    turn = turns_about(own.axis[None], R)[: len(places) - len(slides)]
+                    turn = decompose_rotation(own.axis[None], R)[: len(places) - len(slides)]
                     step[places] = [*(axis @ shift for axis in slides), *turn]
         return self.integrate(self.q0, step)
 
@@ -366,7 +368,7 @@ class PinocchioModel:
 
     def is_normalized(self, q: Array) -> bool:
         """Return True if all rotations in ``q`` are unit quaternions."""
-        return bool(pin.isNormalized(self.model, q, SAME_GEOMETRY))
+        return bool(pin.isNormalized(self.model, q, GEOMETRY_DIFFERENCE_TOL))
 
     def difference(self, q: Array, other: Array) -> Array:
         """The step (nv) that leads from ``q`` to ``other``."""
@@ -374,9 +376,11 @@ class PinocchioModel:
 
     def actuated_indices(self) -> list[int]:
         """Velocity indices of the actuated joints' coordinates."""
-        return [i for joint in self.mechanism.joints.values() if joint.actuated for i in self.coordinates[joint.name]]
+        return [
+            i for joint in self.mechanism.joints.values() if joint.is_actuated for i in self.coordinates[joint.name]
+        ]
 
 
-def across(axis: Array) -> Array:
+def choose_slide_direction(axis: Array) -> Array:
     """The first direction in which a planar joint with this normal slides."""
     return np.asarray(np.linalg.svd(axis[None, :])[2][1])

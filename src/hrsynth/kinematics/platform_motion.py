@@ -11,16 +11,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import BadRequest
-from ..geometry.ranks import range_basis, space_basis
-from ..geometry.screws import point_velocity
-from ..geometry.so3 import between, exponential, logarithm, turn_about, wrap_angle
+from ..geometry.ranks import compute_range_basis, compute_space_basis
+from ..geometry.screws import compute_point_velocity
+from ..geometry.so3 import (
+    convert_rotations_to_vectors,
+    convert_vectors_to_rotations,
+    find_smallest_rotations,
+    turn_about,
+    wrap_angle,
+)
 from ..geometry.vectors import Array, orient_axis, transform
-from ..mechanism.pose import RADIANS, Pose, PoseForm, positive_half_turn, write_parts
+from ..mechanism.pose import RADIANS, Pose, PoseForm, normalise_half_turn, write_parts
 from ..results import Value
-from ..tolerances import AS_PRINTED, RANK_CUTOFF
+from ..tolerances import PRINTED_POSE_TOL, RANK_CUTOFF_FRACTION
 from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
-from .velocity_relation import ObservationModel, relation
+from .velocity_relation import ObservationModel, compute_relation
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -45,18 +51,18 @@ class PoseTask(Value):
         X, V = frames[0], velocities[0]
         R = X[:3, :3]
         errors = [(self.directions @ (R @ self.point + X[:3, 3]) - self.values) / model.length]
-        blocks = [self.directions @ point_velocity(V, X[:3, :3] @ self.point / model.length)]
+        blocks = [self.directions @ compute_point_velocity(V, X[:3, :3] @ self.point / model.length)]
         if self.phi is not None:
             angle, row = turn_about(self.normal, R @ self.zero.T)
             errors.append(np.array([wrap_angle(angle - self.phi)]))
             blocks.append(row[None] @ V[3:])
         if self.rotation is not None:
-            errors.append(logarithm(R @ self.rotation.T))
+            errors.append(convert_rotations_to_vectors(R @ self.rotation.T))
             blocks.append(V[3:])
         if self.axis is not None:
             moved = R @ self.zero.T @ self.axis
             across = np.linalg.svd(self.axis[None])[2][1:]
-            errors.append(across @ between(self.axis, moved))
+            errors.append(across @ find_smallest_rotations(self.axis, moved))
             blocks.append(across @ V[3:])
         return np.concatenate(errors), np.vstack(blocks)
 
@@ -66,7 +72,9 @@ class PoseTask(Value):
         R = X[:3, :3]
         apart = [self.directions @ (R @ self.point + X[:3, 3]) - self.values]
         if self.phi is not None:
-            swing = logarithm(R @ self.zero.T @ exponential(-self.phi * self.normal))
+            swing = convert_rotations_to_vectors(
+                R @ self.zero.T @ convert_vectors_to_rotations(-self.phi * self.normal)
+            )
             apart.append(np.array([self.normal @ swing if np.linalg.norm(swing) < np.pi - tolerance else np.inf]))
         if self.rotation is not None:
             apart.append((R - self.rotation).ravel())
@@ -90,8 +98,8 @@ class PoseTask(Value):
             angle = turn_about(self.normal, R @ self.zero.T)[0]
             phi = angle + fraction * (phi - angle)
         if rotation is not None:
-            way = logarithm(rotation @ R.T)
-            rotation = exponential(fraction * way) @ R
+            way = convert_rotations_to_vectors(rotation @ R.T)
+            rotation = convert_vectors_to_rotations(fraction * way) @ R
         return replace(self, values=start + fraction * (self.values - start), phi=phi, rotation=rotation)
 
 
@@ -125,14 +133,16 @@ class PlatformMotion(Value):
         point = np.zeros(3) if observation_model.point is None else observation_model.point
         columns = []
         for at in configurations:
-            found = np.zeros((6, (basis := relation(at, asked).twists).shape[1]))
+            found = np.zeros((6, (basis := compute_relation(at, asked).twists).shape[1]))
             found[: len(basis)] = basis
             columns.append(found)
             model = at.model
         together = np.hstack(columns)
-        translations, rotations, twists = (space_basis(part, 1.0) for part in (together[:3], together[3:], together))
+        translations, rotations, twists = (
+            compute_space_basis(part, 1.0) for part in (together[:3], together[3:], together)
+        )
         home, dof = model.pose(model.q0, observation_model.platform), max(column.shape[1] for column in columns)
-        shifts = max(range_basis(column[:3], 1.0)[1].value for column in columns)
+        shifts = max(compute_range_basis(column[:3], 1.0)[1].value for column in columns)
         return cls(
             observation_model.platform,
             point,
@@ -151,25 +161,31 @@ class PlatformMotion(Value):
         if self.rotations.shape[1] != 1:
             return np.array([0.0, 0.0, 1.0])
         normal = self.rotations[:, 0]
-        if np.linalg.norm(normal @ self.translations) > RANK_CUTOFF:
+        if np.linalg.norm(normal @ self.translations) > RANK_CUTOFF_FRACTION:
             return np.array([0.0, 0.0, 1.0])
         return orient_axis(normal)
 
     @property
-    def planar(self) -> bool:
+    def is_planar(self) -> bool:
         """True if it moves freely in a plane: two translations and the rotation about their normal."""
         return (self.translations.shape[1], self.rotations.shape[1], self.dof) == (2, 1, 3)
 
     @property
-    def turns_once(self) -> bool:
+    def has_one_rotation(self) -> bool:
         """True if its only rotation is phi."""
-        return self.rotations.shape[1] == 1 and abs(float(self.normal @ self.rotations[:, 0])) > 1 - RANK_CUTOFF
+        return (
+            self.rotations.shape[1] == 1 and abs(float(self.normal @ self.rotations[:, 0])) > 1 - RANK_CUTOFF_FRACTION
+        )
 
     @property
     def parts(self) -> tuple[str, ...]:
         """Parts of a pose that the platform can change."""
-        found = [name for name, row in zip("xyz", self.translations, strict=True) if np.linalg.norm(row) > RANK_CUTOFF]
-        if np.linalg.norm(self.normal @ self.rotations) > RANK_CUTOFF:
+        found = [
+            name
+            for name, row in zip("xyz", self.translations, strict=True)
+            if np.linalg.norm(row) > RANK_CUTOFF_FRACTION
+        ]
+        if np.linalg.norm(self.normal @ self.rotations) > RANK_CUTOFF_FRACTION:
             found.append("phi")
         return (*found, "rpy") if self.rotations.shape[1] else tuple(found)
 
@@ -193,11 +209,13 @@ class PlatformMotion(Value):
         """Return a platform pose X (4, 4) as a user writes it; of a point body the position alone, of one that rotates
         about one axis that rotation, as phi in degrees."""
         found = Pose.of(X, None if self.body else self.point)
-        if found.rotation is None or (self.form == RADIANS and not self.turns_once):
+        if found.rotation is None or (self.form == RADIANS and not self.has_one_rotation):
             return found
         parts, turn = found.given, X[:3, :3] @ self.home[:3, :3].T
-        if (self.form.phi or self.turns_once) and np.linalg.norm(turn @ self.normal - self.normal) <= AS_PRINTED:
-            parts["phi"] = (positive_half_turn(turn_about(self.normal, turn)[0]),)
+        if (self.form.phi or self.has_one_rotation) and np.linalg.norm(
+            turn @ self.normal - self.normal
+        ) <= PRINTED_POSE_TOL:
+            parts["phi"] = (normalise_half_turn(turn_about(self.normal, turn)[0]),)
             del parts["rpy"]
         return replace(found, shown=write_parts(parts, self.form.degrees or "phi" in parts))
 
@@ -206,14 +224,14 @@ class PlatformMotion(Value):
         change."""
         constant = [name for name in pose.given if name not in self.parts]
         for name in constant:
-            if not self._as_at_home(pose, name):
+            if not self._is_zero_value(pose, name):
                 raise BadRequest(f"{robot}: the platform cannot change {name}", str(pose), self.parts)
         pose = pose.without(constant)
         normal, phi, rotation = self.normal, pose.phi, pose.rotation
         if rotation is not None and self.rotations.shape[1] == 1:
             turn, normal = rotation @ self.home[:3, :3].T, self.rotations[:, 0]
             phi, rotation = turn_about(normal, turn)[0], None
-            if np.linalg.norm(turn @ normal - normal) > AS_PRINTED:
+            if np.linalg.norm(turn @ normal - normal) > PRINTED_POSE_TOL:
                 axis = " ".join(f"{x:.4g}" for x in self.rotations[:, 0])
                 raise BadRequest(
                     f"{pose}: the platform of {robot} rotates about one axis only",
@@ -229,9 +247,12 @@ class PlatformMotion(Value):
         if goal.rotation is not None:
             X[:3, :3] = goal.rotation
         elif goal.phi is not None:
-            X[:3, :3] = exponential(goal.phi * goal.normal) @ self.home[:3, :3]
+            X[:3, :3] = convert_vectors_to_rotations(goal.phi * goal.normal) @ self.home[:3, :3]
         along = goal.directions @ self.translations
-        way = self.translations @ np.linalg.lstsq(along, goal.values - goal.directions @ home, rcond=RANK_CUTOFF)[0]
+        way = (
+            self.translations
+            @ np.linalg.lstsq(along, goal.values - goal.directions @ home, rcond=RANK_CUTOFF_FRACTION)[0]
+        )
         X[:3, 3] = home + way - X[:3, :3] @ self.point
         return X
 
@@ -240,20 +261,22 @@ class PlatformMotion(Value):
         k = self.translations.shape[1]
         return not k or (
             len(goal.values) > 0
-            and bool(np.linalg.matrix_rank(goal.directions @ self.translations, tol=RANK_CUTOFF) == k)
+            and bool(np.linalg.matrix_rank(goal.directions @ self.translations, tol=RANK_CUTOFF_FRACTION) == k)
         )
 
     def turns_left(self, goal: PoseTask) -> int:
         """Return the number of the platform's rotations that a task leaves free."""
         return 0 if goal.rotation is not None else self.rotations.shape[1] - (goal.phi is not None)
 
-    def _as_at_home(self, pose: Pose, name: str) -> bool:
+    def _is_zero_value(self, pose: Pose, name: str) -> bool:
         """Return True if a part that never changes is given as it is at the zero configuration, to the digits
         printed."""
         if name in "xyz":
             here = self.position(self.home)["xyz".index(name)]
-            return abs(float(getattr(pose, name)) - float(here)) <= AS_PRINTED
-        return pose.rotation is not None and float(np.linalg.norm(pose.rotation - self.home[:3, :3])) <= AS_PRINTED
+            return abs(float(getattr(pose, name)) - float(here)) <= PRINTED_POSE_TOL
+        return (
+            pose.rotation is not None and float(np.linalg.norm(pose.rotation - self.home[:3, :3])) <= PRINTED_POSE_TOL
+        )
 
     def at_home(self) -> PoseTask:
         """Return the task of the whole pose at the zero configuration: free parts are nearest to it."""

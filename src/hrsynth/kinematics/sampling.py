@@ -15,44 +15,51 @@ from typing import TypeVar
 
 import numpy as np
 
-from ..budgets import EASY_ITERATIONS
-from ..errors import BadMechanism, NotSampled, UndefinedValue
-from ..geometry.ranks import range_bases
+from ..budgets import RETRACE_ITERATIONS_MAX
+from ..errors import BadMechanism, SamplingFailure, UndefinedValue
+from ..geometry.ranks import compute_range_bases
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
 from ..results import Value
 from ..tolerances import (
-    CLOSED,
-    FOLLOWED,
-    INVERTED,
-    RANK_GAP,
-    SOLVED,
-    SURELY_SOMETHING,
-    UNMOVING,
+    CLOSURE_RESIDUAL_TOL,
+    CLOSURE_SOLVER_TOL,
+    FEASIBLE_MOTION_MIN_FRACTION,
+    HIDDEN_ROBOT_RESIDUAL_TOL,
+    NONZERO_SINGULAR_VALUE_MIN,
+    PSEUDOINVERSE_CUTOFF_FRACTION,
+    RANK_GAP_MIN,
 )
-from .branch_tests import OperationMode, Signature, alike_along, group_modes, turns_of
+from .branch_tests import OperationMode, Signature, group_modes, has_steady_values_along, rank_rotations
 from .configuration import ClosedConfiguration
 from .operation_modes import (
-    STEPS,
-    far_walks,
-    firmest,
+    SAMPLE_PATH_STEPS_COUNT,
+    choose_firmest,
+    close_precisely,
+    find_other_modes,
+    find_ways_out,
+    identify_mode,
     is_regular,
-    mode_at,
-    other_modes,
     require_motions,
     require_one,
-    ways_out,
-    well_closed,
+    walk_far,
 )
 from .path_tracking import track_paths
 from .pinocchio_model import PinocchioModel
 from .tasks import PoseAndValuesTask, TaskBatch, shorten_step, solve_together
-from .velocity_relation import ObservationModel, VelocityRelation, relation, relations
-from .walking import HALVED, STEP, WEAKEST, any_velocity, lands_beside, step_along
+from .velocity_relation import ObservationModel, VelocityRelation, compute_relation, compute_relations
+from .walking import (
+    HALVED,
+    WALK_SINGULAR_VALUE_MIN_FRACTION,
+    WALK_STEP_NORM_FRACTION,
+    draw_velocity,
+    is_step_on_branch,
+    step_along,
+)
 
 X = TypeVar("X")
 
-TURNS = 3
+WALK_DIRECTIONS_MAX = 3
 """Number of directions that a walk tries before a singularity before it is given up."""
 
 
@@ -70,7 +77,7 @@ class Sample(Value):
         """Number of independent values that each observation clearly shows: fewer if it is itself nearly
         singular, as a circle that is observed edge-on."""
         rows = [self.relation.basis[self.relation.rows_of(place)] for place in range(len(self.relation.sizes))]
-        return [int(np.sum(np.linalg.svd(each, compute_uv=False) > SURELY_SOMETHING)) for each in rows]
+        return [int(np.sum(np.linalg.svd(each, compute_uv=False) > NONZERO_SINGULAR_VALUE_MIN)) for each in rows]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -95,7 +102,7 @@ class Samples(Value):
     @cached_property
     def signature(self) -> Signature:
         """Signature of the samples' operation mode, from one with the most rotations."""
-        return Signature.of(max((member.relation for member in self.members), key=turns_of))
+        return Signature.of(max((member.relation for member in self.members), key=rank_rotations))
 
 
 def sample(
@@ -106,7 +113,7 @@ def sample(
     *,
     led_by: Sequence[Observation] | None = None,
 ) -> Samples:
-    """Return ``count`` random samples of one operation mode; raises ``NotSampled`` if too few can be reached,
+    """Return ``count`` random samples of one operation mode; raises ``SamplingFailure`` if too few can be reached,
     ``BranchPoint`` if the zero configuration belongs to several.
 
     The robot should find its path again led by the platform's pose and the observations ``led_by`` (default: all); if
@@ -114,20 +121,20 @@ def sample(
     """
     leading = {o.key for o in (observation_model.observations if led_by is None else led_by)}
     start = ClosedConfiguration.of(model, model.q0)
-    moves = relation(start, observation_model).dimension > 0
+    moves = compute_relation(start, observation_model).dimension > 0
     if not moves and not start.kernel()[0].shape[1]:
         raise BadMechanism(f"{model.mechanism.name}: its loops let no link move", remedy="Check its loop closures.")
     rng = np.random.default_rng(seed)
     regular = is_regular(start, rng)
-    roots = [start] if regular and moves else ways_out(start, observation_model, rng, singular=not regular)
+    roots = [start] if regular and moves else find_ways_out(start, observation_model, rng, singular=not regular)
     for freely in (False, True):
         walks = _Walks(observation_model, leading, np.random.default_rng(seed), freely)
         members, discarded, led = walks.sample(roots, count)
         signatures = [Signature.of(member.relation) for member in members]
-        if freely or not (far := far_walks(roots[0])):
+        if freely or not (far := walk_far(roots[0])):
             break
-        probe = mode_at(firmest(far), observation_model)
-        if probe is None or all(map(probe.signature.agrees, signatures)):
+        probe = identify_mode(choose_firmest(far), observation_model)
+        if probe is None or all(map(probe.signature.may_be_same_mode, signatures)):
             break
     require_motions([member.configuration for member in members])
     groups = group_modes(
@@ -143,7 +150,7 @@ def sample(
         start,
         tuple(members),
         discarded,
-        other_modes(walks.beyond, own, observation_model),
+        find_other_modes(walks.beyond, own, observation_model),
         led,
     )
 
@@ -175,7 +182,7 @@ class _Stride:
 
     def tangent(self) -> Array:
         """Next part of it, (nv,)."""
-        return self.part * shorten_step(STEP * self.velocity, 3 * STEP)
+        return self.part * shorten_step(WALK_STEP_NORM_FRACTION * self.velocity, 3 * WALK_STEP_NORM_FRACTION)
 
     def shortened(self) -> _Stride | None:
         """Return the step with its next part halved, which did not follow the branch; None if it would be too small."""
@@ -183,7 +190,7 @@ class _Stride:
 
     def ahead(self) -> _Stride | None:
         """Return the step with a next part that may follow the branch, which is tested before it is closed."""
-        if alike_along(self.here, self.tangent()):
+        if has_steady_values_along(self.here, self.tangent()):
             return self
         shorter = self.shortened()
         return shorter and shorter.ahead()
@@ -205,7 +212,7 @@ class _Walks:
 
     def sample(self, roots: Sequence[ClosedConfiguration], count: int) -> tuple[list[Sample], int, bool]:
         """Return so many samples, the number discarded, and whether the robot finds all of them again; raises
-        ``NotSampled``."""
+        ``SamplingFailure``."""
         members, lonely = list[Sample](), list[Sample]()
         discarded, draws, most = 0, 0, 4 * count
         while len(members) < count and draws < most:
@@ -217,28 +224,28 @@ class _Walks:
         if len(members) == count:
             return members, discarded + len(lonely), True
         if len(members) + len(lonely) < count:
-            raise NotSampled(roots[0].model.mechanism.name, len(members) + len(lonely), count, draws)
+            raise SamplingFailure(roots[0].model.mechanism.name, len(members) + len(lonely), count, draws)
         return [*members, *lonely][:count], discarded, False
 
     def _finds_again(self, samples: Sequence[Sample]) -> Iterator[bool]:
         """Yield True if the robot, led along the path of each sample, arrives."""
         ways = [[target.of(lambda o: o.key in self.leading) for target in sample.way] for sample in samples]
-        for led in track_paths(samples[0].configuration.model, ways, EASY_ITERATIONS) if ways else ():
-            yield not isinstance(led, UndefinedValue) and led[1] <= FOLLOWED
+        for led in track_paths(samples[0].configuration.model, ways, RETRACE_ITERATIONS_MAX) if ways else ():
+            yield not isinstance(led, UndefinedValue) and led[1] <= HIDDEN_ROBOT_RESIDUAL_TOL
 
     def walk(self, starts: Sequence[ClosedConfiguration]) -> list[Sample]:
         """Return the samples at the ends of random walks from these configurations, in step; without those that are
         blocked, or whose ranks are not clear."""
         observation_model = self.question
-        noise = self.rng.normal(size=(len(starts), STEPS + 1, observation_model.size))
+        noise = self.rng.normal(size=(len(starts), SAMPLE_PATH_STEPS_COUNT + 1, observation_model.size))
         walkers = [
-            _Walker(start, iter(own), WEAKEST * start.kernel()[1].weakest)
+            _Walker(start, iter(own), WALK_SINGULAR_VALUE_MIN_FRACTION * start.kernel()[1].weakest)
             for start, own in zip(starts, noise, strict=True)
         ]
-        for _ in range(STEPS):
+        for _ in range(SAMPLE_PATH_STEPS_COUNT):
             if self.freely:
                 for walker in walkers:
-                    idly = 2 * any_velocity(walker.here, self.rng)
+                    idly = 2 * draw_velocity(walker.here, self.rng)
                     walker.here = next(
                         (there for part in HALVED if (there := step_along(walker.here, idly, part)) is not None),
                         walker.here,
@@ -252,21 +259,22 @@ class _Walks:
         steady = [
             (at, [each for each in walker.way if each is not None])
             for walker in walkers
-            if (at := well_closed(walker.here)) is not None
+            if (at := close_precisely(walker.here)) is not None
         ]
         found = _measure_all(
-            lambda at: relations(at, observation_model, observation_model.rows_together(at)), [at for at, _ in steady]
+            lambda at: compute_relations(at, observation_model, observation_model.rows_together(at)),
+            [at for at, _ in steady],
         )
         return [
             Sample(at, tuple(way), each)
             for (at, way), each in zip(steady, found, strict=True)
-            if each is not None and each.gap >= RANK_GAP
+            if each is not None and each.gap >= RANK_GAP_MIN
         ]
 
     def _step(self, walkers: Sequence[_Walker]) -> list[_Walker]:
         """Make one step of each, in another direction if it is blocked; return those that were not blocked in all."""
         left = list(walkers)
-        for _ in range(TURNS):
+        for _ in range(WALK_DIRECTIONS_MAX):
             if not left:
                 break
             aims = self._velocities([walker.here for walker in left], [partial(self._aim, walker) for walker in left])
@@ -303,12 +311,17 @@ class _Walks:
         rows = _measure_all(self.question.rows_together, here)
         images = {i: moved @ here[i].kernel()[0] for i, moved in enumerate(rows) if moved is not None}
         found: list[tuple[Array, Array] | None] = [None] * len(here)
-        for (i, image), (basis, rank) in zip(images.items(), range_bases(list(images.values()), 1.0), strict=True):
+        for (i, image), (basis, rank) in zip(
+            images.items(), compute_range_bases(list(images.values()), 1.0), strict=True
+        ):
             wanted = basis @ aims[i](basis) if rank.value else np.zeros(len(image))
             norm = float(np.linalg.norm(wanted))
-            if norm >= UNMOVING:
+            if norm >= FEASIBLE_MOTION_MIN_FRACTION:
                 wanted = wanted / norm
-                found[i] = here[i].kernel()[0] @ np.linalg.lstsq(image, wanted, rcond=INVERTED)[0], wanted
+                found[i] = (
+                    here[i].kernel()[0] @ np.linalg.lstsq(image, wanted, rcond=PSEUDOINVERSE_CUTOFF_FRACTION)[0],
+                    wanted,
+                )
         return found
 
     def _stride(
@@ -344,11 +357,11 @@ class _Walks:
         """Make the next part of several steps, see :func:`.walking.step_along`."""
         model, tangents = strides[0].here.model, [stride.tangent() for stride in strides]
         predicted = [model.integrate(stride.here.q, tangent) for stride, tangent in zip(strides, tangents, strict=True)]
-        solved = solve_together(TaskBatch(model, None), predicted, [None] * len(strides), tolerance=SOLVED)
-        closed = [k for k, (_, residual) in enumerate(solved) if residual <= CLOSED]
+        solved = solve_together(TaskBatch(model, None), predicted, [None] * len(strides), tolerance=CLOSURE_SOLVER_TOL)
+        closed = [k for k, (_, residual) in enumerate(solved) if residual <= CLOSURE_RESIDUAL_TOL]
         found: list[ClosedConfiguration | None] = [None] * len(strides)
         for k, there in zip(closed, ClosedConfiguration.several(model, [solved[k][0] for k in closed]), strict=True):
-            if lands_beside(strides[k].here, tangents[k], predicted[k], there):
+            if is_step_on_branch(strides[k].here, tangents[k], predicted[k], there):
                 found[k] = there
             elif strides[k].part == 1:
                 self.beyond.append(there)

@@ -12,17 +12,17 @@ from typing import Protocol
 
 import numpy as np
 
-from ..geometry.gauss_newton import Damping, Residual, descend, descend_together
-from ..geometry.screws import point_velocity
-from ..geometry.so3 import exponential, logarithm
+from ..geometry.gauss_newton import DampingFactor, Residual, descend, descend_together
+from ..geometry.screws import compute_point_velocity
+from ..geometry.so3 import convert_rotations_to_vectors, convert_vectors_to_rotations
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
 from ..results import Value
-from ..tolerances import CLOSED
+from ..tolerances import CLOSURE_RESIDUAL_TOL
 from .configuration import measure, measure_together
 from .pinocchio_model import PinocchioModel
 
-DAMPING = Damping(start=1.0, eased=0.1, least=0.1, most=1e8)
+DAMPING = DampingFactor(start=1.0, eased=0.1, least=0.1, most=1e8)
 """Of loops and tasks, as a multiple of the squared residual."""
 
 
@@ -80,7 +80,7 @@ class PoseAndValuesTask(Value):
         observations = tuple(o for o, _ in self.measured)
         frames, velocities, values, rates = measure(model, q, self.reference, observations, (self.link,))
         X, V = frames[0], velocities[0]
-        block = V if self.point is None else point_velocity(V, X[:3, :3] @ self.point / model.length)
+        block = V if self.point is None else compute_point_velocity(V, X[:3, :3] @ self.point / model.length)
         apart = (o.difference(value, wanted) for value, (o, wanted) in zip(values, self.measured, strict=True))
         (missed,) = self.misses([self], X[None], model.length)
         return np.concatenate([missed, *apart]), np.concatenate([block, *rates])
@@ -95,7 +95,12 @@ class PoseAndValuesTask(Value):
         if fraction == 1:
             return other
         pose = other.pose.copy()
-        pose[:3, :3] = exponential(fraction * logarithm(other.pose[:3, :3] @ self.pose[:3, :3].T)) @ self.pose[:3, :3]
+        pose[:3, :3] = (
+            convert_vectors_to_rotations(
+                fraction * convert_rotations_to_vectors(other.pose[:3, :3] @ self.pose[:3, :3].T)
+            )
+            @ self.pose[:3, :3]
+        )
         pose[:3, 3] = (1 - fraction) * self.pose[:3, 3] + fraction * other.pose[:3, 3]
         return replace(
             self,
@@ -126,13 +131,15 @@ class PoseAndValuesTask(Value):
                 )
                 / length
             )
-        return pose_errors(X, wanted, length)
+        return compute_pose_errors(X, wanted, length)
 
 
-def pose_errors(X: Array, wanted: Array, length: float) -> Array:
+def compute_pose_errors(X: Array, wanted: Array, length: float) -> Array:
     """Return the differences of poses (n, 4, 4) from the desired ones, shifts (lengths) and rotations, (n, 6)."""
     turns = X[:, :3, :3] @ wanted[:, :3, :3].swapaxes(1, 2)
-    return np.concatenate([(X[:, :3, 3] - wanted[:, :3, 3]) / length, [logarithm(R) for R in turns]], axis=1)
+    return np.concatenate(
+        [(X[:, :3, 3] - wanted[:, :3, 3]) / length, [convert_rotations_to_vectors(R) for R in turns]], axis=1
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +152,7 @@ class LinkPoses:
     def error_and_jacobian(self, model: PinocchioModel, q: Array) -> tuple[Array, Array]:
         """Return the error (reached − desired) and its Jacobian."""
         reached, velocities = model.frames(q, tuple(link for link, _ in self.wanted))
-        missed = pose_errors(reached, np.array([X for _, X in self.wanted]), model.length).ravel()
+        missed = compute_pose_errors(reached, np.array([X for _, X in self.wanted]), model.length).ravel()
         error, rows = (
             ([], []) if self.besides is None else ([each] for each in self.besides.error_and_jacobian(model, q))
         )
@@ -153,7 +160,12 @@ class LinkPoses:
 
 
 def solve(
-    model: PinocchioModel, q: Array, task: Task | None = None, *, tolerance: float = CLOSED, iterations: int = 30
+    model: PinocchioModel,
+    q: Array,
+    task: Task | None = None,
+    *,
+    tolerance: float = CLOSURE_RESIDUAL_TOL,
+    iterations: int = 30,
 ) -> tuple[Array, float]:
     """Return the configuration that damped Gauss-Newton reaches from ``q``, and the residual left (loops and task).
 
@@ -164,10 +176,10 @@ def solve(
     def advance(q: Array, at: Residual, factor: float) -> Array:
         normal = at.J.T @ at.J
         normal.reshape(-1)[:: model.nv + 1] += max(factor * at.size**2, 1e-14)
-        return model.integrate(q, shorten_step(_damped_step(normal, -(at.J.T @ at.error)), 0.5))
+        return model.integrate(q, shorten_step(_solve_damped_step(normal, -(at.J.T @ at.error)), 0.5))
 
     q, left = descend(
-        q, lambda q: system(model, q, task), advance, DAMPING, iterations, lambda at: at.size <= tolerance
+        q, lambda q: stack_task(model, q, task), advance, DAMPING, iterations, lambda at: at.size <= tolerance
     )
     return q, left.size
 
@@ -177,7 +189,7 @@ def solve_together(
     starts: Sequence[Array],
     targets: Sequence[PoseAndValuesTask | None],
     *,
-    tolerance: float = CLOSED,
+    tolerance: float = CLOSURE_RESIDUAL_TOL,
     iterations: int = 30,
 ) -> list[tuple[Array, float]]:
     """As :func:`solve`, from several configurations in step, each to its own target: the same answers."""
@@ -196,7 +208,7 @@ def solve_together(
         try:
             steps = np.linalg.solve(normal, wanted)[:, :, 0]
         except np.linalg.LinAlgError:
-            steps = np.array([_damped_step(*each) for each in zip(normal, wanted[:, :, 0], strict=True)])
+            steps = np.array([_solve_damped_step(*each) for each in zip(normal, wanted[:, :, 0], strict=True)])
         longest = np.abs(steps).max(axis=1, initial=0.0).tolist()
         return {
             i: model.integrate(q, step if size <= 0.5 else shorten_step(step, 0.5))
@@ -209,7 +221,7 @@ def solve_together(
     ]
 
 
-def _damped_step(normal: Array, wanted: Array) -> Array:
+def _solve_damped_step(normal: Array, wanted: Array) -> Array:
     """The step of damped normal equations."""
     try:
         return np.asarray(np.linalg.solve(normal, wanted), dtype=float)
@@ -268,7 +280,9 @@ class TaskBatch:
             return loops, J, X, values
         X, V = X[:, 0], V[:, 0]
         if like.point is not None:
-            V = np.array([point_velocity(v, x[:3, :3] @ like.point / model.length) for v, x in zip(V, X, strict=True)])
+            V = np.array(
+                [compute_point_velocity(v, x[:3, :3] @ like.point / model.length) for v, x in zip(V, X, strict=True)]
+            )
         return loops, np.concatenate([J, V, rates], axis=1), X, values
 
 
@@ -278,7 +292,7 @@ def shorten_step(step: Array, longest: float) -> Array:
     return step * (longest / largest) if largest > longest else step
 
 
-def system(model: PinocchioModel, q: Array, task: Task | None) -> tuple[Array, Array]:
+def stack_task(model: PinocchioModel, q: Array, task: Task | None) -> tuple[Array, Array]:
     """Error and Jacobian of the loops and, below them, of the task."""
     error, J = model.residual(q), model.jacobian(q)
     if task is None:

@@ -11,12 +11,12 @@ from functools import cached_property
 
 import numpy as np
 
-from ..geometry.ranks import Rank, range_bases, range_basis, spectra
-from ..geometry.screws import point_velocity
+from ..geometry.ranks import Rank, compute_matrix_spectra, compute_range_bases, compute_range_basis
+from ..geometry.screws import compute_point_velocity
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
 from ..results import Value
-from ..tolerances import INVERTED
+from ..tolerances import PSEUDOINVERSE_CUTOFF_FRACTION
 from .configuration import ClosedConfiguration, measure, measure_together
 from .tasks import PoseAndValuesTask
 
@@ -78,7 +78,9 @@ class ObservationModel(Value):
         X, V, _, rates = measure(at.model, at.q, self.reference, seen, (self.platform, *self.others, *self.bodies))
         found, own = iter(rates), 1 + len(self.others)
         parts = (
-            [*V[:own]] if self.point is None else [point_velocity(V[0], X[0][:3, :3] @ self.point / at.model.length)]
+            [*V[:own]]
+            if self.point is None
+            else [compute_point_velocity(V[0], X[0][:3, :3] @ self.point / at.model.length)]
         )
         parts += [np.zeros((o.size, at.model.nv)) if o.link in blind else next(found) for o in self.observations]
         return np.vstack([*parts, *V[own:]])
@@ -96,7 +98,7 @@ class ObservationModel(Value):
             if self.point is None
             else np.array(
                 [
-                    point_velocity(v, x[:3, :3] @ self.point / model.length)
+                    compute_point_velocity(v, x[:3, :3] @ self.point / model.length)
                     for v, x in zip(V[:, 0], X[:, 0], strict=True)
                 ]
             )
@@ -151,7 +153,7 @@ class VelocityRelation(Value):
 
     @cached_property
     def _platform(self) -> tuple[Array, Rank]:
-        return range_basis(self.twist_part, 1.0)
+        return compute_range_basis(self.twist_part, 1.0)
 
     @property
     def dof(self) -> Rank:
@@ -199,50 +201,52 @@ class VelocityRelation(Value):
 def look(found: Sequence[VelocityRelation]) -> None:
     """Decompose several relations together: the unobserved twists of each, and what moves while the platform is
     fixed."""
-    still = spectra([each.rates for each in found], 1.0)
-    unseen = range_bases([each.twist_part @ seen.kernel for each, seen in zip(found, still, strict=True)], 1.0)
-    resting = spectra([each.twist_part for each in found], 1.0)
-    beside = range_bases([each.rates @ at.kernel for each, at in zip(found, resting, strict=True)], 1.0)
+    still = compute_matrix_spectra([each.rates for each in found], 1.0)
+    unseen = compute_range_bases([each.twist_part @ seen.kernel for each, seen in zip(found, still, strict=True)], 1.0)
+    resting = compute_matrix_spectra([each.twist_part for each in found], 1.0)
+    beside = compute_range_bases([each.rates @ at.kernel for each, at in zip(found, resting, strict=True)], 1.0)
     for each, seen, (basis, rank), (_, free) in zip(found, still, unseen, beside, strict=True):
         each.__dict__["_unseen"] = basis, Rank(rank.value, min(rank.gap, seen.rank.gap)), seen.rank
         each.__dict__["RI"] = free.value
 
 
-def platform_motions(at: ClosedConfiguration, observation_model: ObservationModel) -> Array:
+def compute_platform_motions(at: ClosedConfiguration, observation_model: ObservationModel) -> Array:
     """Return joint velocities (nv, dof), without internal motions, that move the platform by an orthonormal basis of
     its twists (characteristic lengths)."""
     kernel, _ = at.kernel()
     image = observation_model.rows(at)[: observation_model.twist_rows] @ kernel
-    moves, _ = range_basis(image, 1.0)
-    return np.asarray(kernel @ np.linalg.lstsq(image, moves, rcond=INVERTED)[0])
+    moves, _ = compute_range_basis(image, 1.0)
+    return np.asarray(kernel @ np.linalg.lstsq(image, moves, rcond=PSEUDOINVERSE_CUTOFF_FRACTION)[0])
 
 
-def relation(
+def compute_relation(
     at: ClosedConfiguration, observation_model: ObservationModel, *, blind: frozenset[str] = frozenset()
 ) -> VelocityRelation:
     """ρ at a closed configuration."""
-    return relations([at], observation_model, [observation_model.rows(at, blind=blind)])[0]
+    return compute_relations([at], observation_model, [observation_model.rows(at, blind=blind)])[0]
 
 
-def relations(
+def compute_relations(
     at: Sequence[ClosedConfiguration], observation_model: ObservationModel, rows: Sequence[Array]
 ) -> list[VelocityRelation]:
     """Return ρ at several closed configurations of one model, from the rows that the observation model has there."""
-    return _relations(at, rows, observation_model.twist_rows, observation_model.sizes)
+    return _compute_relations(at, rows, observation_model.twist_rows, observation_model.sizes)
 
 
-def relation_of(at: ClosedConfiguration, observation_model: ObservationModel, rows: Array) -> VelocityRelation:
+def compute_relation_of_rows(
+    at: ClosedConfiguration, observation_model: ObservationModel, rows: Array
+) -> VelocityRelation:
     """Return ρ between the platform's twist and ``rows`` (measured, nv) of the joint rates, each a measured value of
     its own: the motors' coordinates, for one."""
     twist = replace(observation_model, observations=(), bodies=()).rows(at)
-    return _relations([at], [np.vstack([twist, rows])], observation_model.twist_rows, (1,) * len(rows))[0]
+    return _compute_relations([at], [np.vstack([twist, rows])], observation_model.twist_rows, (1,) * len(rows))[0]
 
 
-def _relations(
+def _compute_relations(
     at: Sequence[ClosedConfiguration], rows: Sequence[Array], twist_rows: int, sizes: tuple[int, ...]
 ) -> list[VelocityRelation]:
     kernels = [each.kernel() for each in at]
-    bases = range_bases([moved @ kernel for moved, (kernel, _) in zip(rows, kernels, strict=True)], 1.0)
+    bases = compute_range_bases([moved @ kernel for moved, (kernel, _) in zip(rows, kernels, strict=True)], 1.0)
     return [
         VelocityRelation(basis, twist_rows, sizes, kernel.shape[1], min(constraints.gap, rank.gap))
         for (kernel, constraints), (basis, rank) in zip(kernels, bases, strict=True)

@@ -17,7 +17,7 @@ ENTRIES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 NAMES = {(0, 0): "ixx", (1, 1): "iyy", (2, 2): "izz", (0, 1): "ixy", (0, 2): "ixz", (1, 2): "iyz"}
 
 
-def number(text: str | None) -> float | None:
+def parse_number(text: str | None) -> float | None:
     """Return the number of a text, None if it is not a number."""
     try:
         return None if text is None else float(numerals.parse(text, 1)[0])
@@ -42,7 +42,7 @@ class NumberAt:
     @property
     def value(self) -> float | None:
         """Number, None if it is not one."""
-        return number(self.text)
+        return parse_number(self.text)
 
     def put(self, text: str) -> None:
         """Write another text."""
@@ -68,7 +68,7 @@ class InertialElement:
     write: Callable[[Array], None]
 
 
-def inertials(file: LintedFile) -> Iterator[InertialElement]:
+def list_inertials(file: LintedFile) -> Iterator[InertialElement]:
     """Yield all inertial elements of a document, in order."""
     if file.root is None or file.dialect is None:
         return
@@ -79,19 +79,19 @@ def inertials(file: LintedFile) -> Iterator[InertialElement]:
             yield _READ[file.dialect](link.get("name") or "", element)
 
 
-def _urdf(link: str, element: xml.Element) -> InertialElement:
+def _read_urdf(link: str, element: xml.Element) -> InertialElement:
     mass, inertia = element.find("mass"), element.find("inertia")
 
     def write(matrix: Array) -> None:
         for found in element.findall("inertia"):
             for at in ENTRIES:
-                found.set(NAMES[at], numerals.exact(matrix[at]))
+                found.set(NAMES[at], numerals.format_exact(matrix[at]))
 
-    given = None if inertia is None else _matrix([inertia.get(NAMES[at]) for at in ENTRIES])
+    given = None if inertia is None else _parse_matrix([inertia.get(NAMES[at]) for at in ENTRIES])
     return InertialElement(link, element, None if mass is None else NumberAt(mass, "value"), given, write)
 
 
-def _sdf(link: str, element: xml.Element) -> InertialElement:
+def _read_sdf(link: str, element: xml.Element) -> InertialElement:
     mass, inertia = element.find("mass"), element.find("inertia")
 
     def write(matrix: Array) -> None:
@@ -99,32 +99,34 @@ def _sdf(link: str, element: xml.Element) -> InertialElement:
             for at in ENTRIES:
                 entry = found.find(NAMES[at])
                 entry = etree.SubElement(found, NAMES[at]) if entry is None else entry
-                entry.text = numerals.exact(matrix[at])
+                entry.text = numerals.format_exact(matrix[at])
 
-    given = None if inertia is None else _matrix([inertia.findtext(NAMES[at]) for at in ENTRIES])
+    given = None if inertia is None else _parse_matrix([inertia.findtext(NAMES[at]) for at in ENTRIES])
     return InertialElement(link, element, None if mass is None else NumberAt(mass), given, write)
 
 
-def _mjcf(link: str, element: xml.Element) -> InertialElement:
+def _read_mjcf(link: str, element: xml.Element) -> InertialElement:
     mass = NumberAt(element, "mass") if element.get("mass") is not None else None
     words = (element.get("diaginertia") or element.get("fullinertia") or "").split()
-    given = _matrix([*words, *["0"] * (6 - len(words))]) if len(words) in (3, 6) else None
+    given = _parse_matrix([*words, *["0"] * (6 - len(words))]) if len(words) in (3, 6) else None
 
     def write(matrix: Array) -> None:
         for name in {"diaginertia", "fullinertia"} & set(element.attrib):
             del element.attrib[name]
         diagonal = not any(matrix[at] for at in ENTRIES[3:])
         entries = ENTRIES[:3] if diagonal else ENTRIES
-        element.set("diaginertia" if diagonal else "fullinertia", numerals.exact_vector([matrix[at] for at in entries]))
+        element.set(
+            "diaginertia" if diagonal else "fullinertia", numerals.format_exact_vector([matrix[at] for at in entries])
+        )
 
     return InertialElement(link, element, mass, given, write)
 
 
-_READ = {"urdf": _urdf, "sdf": _sdf, "mjcf": _mjcf}
+_READ = {"urdf": _read_urdf, "sdf": _read_sdf, "mjcf": _read_mjcf}
 
 
-def _matrix(words: list[str | None]) -> Array | None:
-    values = [0.0 if word is None or not word.strip() else number(word) for word in words]
+def _parse_matrix(words: list[str | None]) -> Array | None:
+    values = [0.0 if word is None or not word.strip() else parse_number(word) for word in words]
     if any(value is None for value in values):
         return None
     matrix = np.zeros((3, 3))
@@ -146,7 +148,7 @@ class LimitElement:
     upper: NumberAt | None
 
     @property
-    def turns(self) -> bool:
+    def is_angle(self) -> bool:
         """Coordinate is an angle."""
         return self.kind in ("revolute", "hinge", "continuous")
 
@@ -157,9 +159,9 @@ class LimitElement:
         return None if found[0] is None or found[1] is None else (found[0], found[1])
 
 
-def limits(file: LintedFile) -> Iterator[LimitElement]:
+def list_limits(file: LintedFile) -> Iterator[LimitElement]:
     """Yield all limits of joints in a document, in order; MJCF's in its own unit."""
-    for joint in joints(file):
+    for joint in list_joint_elements(file):
         name, kind = joint.get("name") or "", joint.get("type", "hinge" if file.dialect == "mjcf" else "")
         if file.dialect == "mjcf":
             if len((joint.get("range") or "").split()) == 2 and joint.get("limited") != "false":
@@ -179,7 +181,7 @@ def limits(file: LintedFile) -> Iterator[LimitElement]:
         yield LimitElement(name, kind, joint, limit, ends[0], ends[1])
 
 
-def joints(file: LintedFile) -> list[xml.Element]:
+def list_joint_elements(file: LintedFile) -> list[xml.Element]:
     """Return the elements of joints: of the tree, loops, and those of plugins."""
     if file.root is None:
         return []

@@ -12,15 +12,15 @@ from functools import cached_property
 
 import numpy as np
 
-from ..budgets import LINTED_POSES, LOOP_TRIES, MOST_LOOP_COORDINATES
+from ..budgets import LINT_RANK_SAMPLES_COUNT, LOOP_ASSEMBLY_TRIES_MAX, LOOP_COORDINATES_MAX
 from ..description.assembly.loops import LoopAssembly, Values, gears_of, joints_of
 from ..description.jointgraph import FrameSpec, JointSpec
 from ..errors import HrsynthError
-from ..geometry.vectors import Array, inverse, pose, transform
+from ..geometry.vectors import Array, build_pose, invert_pose, transform
 from ..mechanism.legs import decompose
 from ..mechanism.model import JointType, Mechanism
-from ..mechanism.normal import normal_form
-from ..tolerances import RANK_GAP, SOLVED
+from ..mechanism.normal import reduce_to_normal_form
+from ..tolerances import CLOSURE_SOLVER_TOL, RANK_GAP_MIN
 
 Pair = tuple[str, str]
 
@@ -40,17 +40,17 @@ class NearbyFreedoms:
     def configurations(self) -> tuple[Values, ...]:
         """Closed values near zero along random motions; zero alone if nothing moves or closes."""
         zero = self.assembly.zero()
-        if self.assembly.size > MOST_LOOP_COORDINATES:
+        if self.assembly.size > LOOP_COORDINATES_MAX:
             return ()
         found: list[Values] = []
         rng = np.random.default_rng(0)
         kernel = self.assembly.kernel(zero)
-        for _ in range(LOOP_TRIES if kernel.shape[1] else 0):
+        for _ in range(LOOP_ASSEMBLY_TRIES_MAX if kernel.shape[1] else 0):
             step = kernel @ rng.normal(size=kernel.shape[1])
             there, residual = self.assembly.close(self.assembly.step(zero, 0.15 * step / np.max(np.abs(step))))
-            if residual <= 10 * SOLVED:
+            if residual <= 10 * CLOSURE_SOLVER_TOL:
                 found.append(there)
-            if len(found) == LINTED_POSES:
+            if len(found) == LINT_RANK_SAMPLES_COUNT:
                 break
         return tuple(found) or (zero,)
 
@@ -69,13 +69,13 @@ class NearbyFreedoms:
             assembly = LoopAssembly(self.mechanism.base, [*joints, *locks], gears)
             rank = assembly.rank(values)
             free = sum(joint.kind.freedoms for joint, _, _ in assembly.tree)
-            yield free - rank.value if rank.gap >= RANK_GAP else None
+            yield free - rank.value if rank.gap >= RANK_GAP_MIN else None
 
     @cached_property
     def point(self) -> Array | None:
         """Point of the platform, in its frame, if its rotation is not controlled (docs/pages/theory.md, section 1)."""
         try:
-            return decompose(normal_form(self.mechanism).mechanism).point
+            return decompose(reduce_to_normal_form(self.mechanism).mechanism).point
         except HrsynthError:
             return None
 
@@ -84,8 +84,8 @@ class NearbyFreedoms:
         one, two = pair
         at, kind = np.eye(4), JointType.FIXED
         if pair == (self.mechanism.base, self.mechanism.platform) and self.point is not None:
-            at, kind = pose(transform(poses[two], self.point)), JointType.SPHERICAL
-        ends = FrameSpec(one, inverse(poses[one]) @ at), FrameSpec(two, inverse(poses[two]) @ at)
+            at, kind = build_pose(transform(poses[two], self.point)), JointType.SPHERICAL
+        ends = FrameSpec(one, invert_pose(poses[one]) @ at), FrameSpec(two, invert_pose(poses[two]) @ at)
         return JointSpec(name, kind, ends, in_tree=False)
 
     @property

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, TypedDict
 
-from ..budgets import MOST_MENDING
-from ..description import file_of
+from ..budgets import LINT_FIX_ROUNDS_MAX
+from ..description import find_robot_file
 from ..description.files import require_writable, write_whole
-from ..description.overrides import Overrides, names
+from ..description.overrides import Overrides, parse_names
 from ..errors import BadRequest, BadRobotFile, Defect
 from ..records import As, Recorded, Shown, recorded
 from ..results import Result, require_keywords
@@ -62,7 +62,7 @@ class Lint(Result, shown_as="lint"):
         """Number of findings of each severity."""
         return {name: sum(each.severity == name for each in self.findings) for name in SEVERITIES}
 
-    def reaches(self, severity: str) -> bool:
+    def has_severity(self, severity: str) -> bool:
         """Return True if a finding is at least that severe; an unread file is."""
         return bool(self.unread) or any(each.rank >= SEVERITIES.index(severity) for each in self.findings)
 
@@ -121,7 +121,7 @@ def lint(
 
     require_keywords(lint, said, (each.name for each in fields(Overrides)))
     paths = list(files) if isinstance(files, Iterable) and not isinstance(files, str) else [files]
-    skipped, programs = names(ignore) or (), tuple(names(program) or ())
+    skipped, programs = parse_names(ignore) or (), tuple(parse_names(program) or ())
     for what, asked, known in (("rule", skipped, tuple(lint_rules())), ("program", programs, PROGRAMS)):
         unknown = [name for name in asked if name and name not in known]
         if unknown:
@@ -133,8 +133,8 @@ def lint(
     if output is not None:
         require_writable(output)
     given = Overrides.said(**said)
-    other = None if compare is None else LintedFile(file_of(compare), given)
-    opened, defects, named = [], list[Defect](), [file_of(path) for path in paths]
+    other = None if compare is None else LintedFile(find_robot_file(compare), given)
+    opened, defects, named = [], list[Defect](), [find_robot_file(path) for path in paths]
     for path in named:
         try:
             opened.append(LintedFile(path, given, readers=programs, other=other))
@@ -144,7 +144,7 @@ def lint(
         raise BadRobotFile(defects)
     mended, written = list[Finding](), None
     if fix:
-        every = [(file, *_mend_file(file, skipped)) for file in opened]
+        every = [(file, *_apply_fixes(file, skipped)) for file in opened]
         new = [(Path(output or file.path), after.data) for file, after, gone in every if gone or output is not None]
         for target, _ in new:
             require_writable(target)
@@ -159,7 +159,7 @@ def lint(
             written = str(target)
         mended = [each for _, _, gone in every for each in gone]
         opened = [after for _, after, _ in every]
-    found = [each for file in opened for each, _ in findings(file, skipped)]
+    found = [each for file in opened for each, _ in collect_findings(file, skipped)]
     return Lint(
         tuple(file.file for file in opened),
         tuple(found),
@@ -170,7 +170,7 @@ def lint(
     )
 
 
-def findings(file: LintedFile, ignore: Sequence[str] = ()) -> list[tuple[Finding, Fix | None]]:
+def collect_findings(file: LintedFile, ignore: Sequence[str] = ()) -> list[tuple[Finding, Fix | None]]:
     """Return the findings in a file and their fixes, by line, the most severe of a line first; a refusal that another
     rule reports is left out."""
     found = []
@@ -201,11 +201,11 @@ def findings(file: LintedFile, ignore: Sequence[str] = ()) -> list[tuple[Finding
     return sorted(found, key=lambda pair: (pair[0].line is None, pair[0].line or 0, -pair[0].rank))
 
 
-def _mend_file(file: LintedFile, ignore: Sequence[str]) -> tuple[LintedFile, list[Finding]]:
+def _apply_fixes(file: LintedFile, ignore: Sequence[str]) -> tuple[LintedFile, list[Finding]]:
     """Return the file with all fixes, and the fixed findings: in rounds, as one may uncover or undo another."""
     gone: list[Finding] = []
-    for _ in range(MOST_MENDING):
-        found = [(each, mend) for each, mend in findings(file, ignore) if mend is not None]
+    for _ in range(LINT_FIX_ROUNDS_MAX):
+        found = [(each, mend) for each, mend in collect_findings(file, ignore) if mend is not None]
         if not found:
             break
         for each, mend in found:

@@ -15,7 +15,7 @@ from ..description.file_format import RobotFile
 from ..description.formats.urdf import xacro
 from ..description.jointgraph import JointGraph
 from ..description.overrides import Overrides
-from ..description.reading import robot_file, understood
+from ..description.reading import build_mechanism, open_robot_file
 from ..errors import BadRobotFile, HrsynthError
 from ..mechanism.model import Mechanism
 
@@ -43,17 +43,17 @@ class LintedFile:
         other: LintedFile | None = None,
     ) -> None:
         self.given, self.readers, self.other = given or Overrides(), readers, other
-        opened = robot_file(Path(path), strict=False)
+        opened = open_robot_file(Path(path), strict=False)
         if opened.root is None and isinstance(
             graph := formats.read(opened), JointGraph
         ):  # a YAML file next to a document
-            opened = robot_file(Path(graph.file), strict=False)
+            opened = open_robot_file(Path(graph.file), strict=False)
         self.path, self.file = opened.path, str(opened.path)
-        self.data = xml.content(opened.path) if text is None else text
-        self.root = opened.root if text is None else xml.document(text, self.file)
+        self.data = xml.read_bytes(opened.path) if text is None else text
+        self.root = opened.root if text is None else xml.parse_document(text, self.file)
         self._opened = replace(opened, root=self.root)
         self.expanded = (
-            text is None and self.root is not None and xacro.is_needed(xml.document(self.data, self.file, []))
+            text is None and self.root is not None and xacro.is_needed(xml.parse_document(self.data, self.file, []))
         )
         """The document is the output of xacro, so no fix can be written to the file."""
         self._remembered: dict[str, Any] = {}
@@ -62,7 +62,7 @@ class LintedFile:
     def open(self, *, strict: bool = False) -> RobotFile:
         """Return the file for a reader, which may change its document."""
         return replace(
-            self._opened, root=copy.deepcopy(self.root), strict=strict and not self.given.any, as_spelt=not strict
+            self._opened, root=copy.deepcopy(self.root), strict=strict and not self.given.has_any, as_spelt=not strict
         )
 
     def graph(self) -> JointGraph:
@@ -82,7 +82,7 @@ class LintedFile:
     @cached_property
     def _read(self) -> Mechanism | HrsynthError:
         try:
-            return understood(self.open(strict=True), self.given)
+            return build_mechanism(self.open(strict=True), self.given)
         except HrsynthError as error:
             return error
 
@@ -97,7 +97,7 @@ class LintedFile:
         if isinstance(self._read, Mechanism):
             return self._read
         try:
-            return understood(self.open(), self.given)
+            return build_mechanism(self.open(), self.given)
         except HrsynthError:
             return None
 
@@ -113,7 +113,7 @@ class LintedFile:
         name."""
         if self.root is None or line is None or isinstance(line, xml.SourceLine):
             return None
-        found = [each for each in self.root.iter(*tags) if xml.line(each) == line]
+        found = [each for each in self.root.iter(*tags) if xml.get_line(each) == line]
         if len(found) > 1:
             found = [each for each in found if each.get("name") == name]
         return found[0] if len(found) == 1 else None
@@ -132,7 +132,7 @@ class LintedFile:
         return (head[0] if head else b"") + text + (tail[1] if tail else b"")
 
 
-def defects_of(error: HrsynthError) -> list[tuple[int | None, str]]:
+def list_defects(error: HrsynthError) -> list[tuple[int | None, str]]:
     """Return line and text of all defects of an error."""
     if isinstance(error, BadRobotFile):
         return [(each.line, each.text) for each in error.defects]

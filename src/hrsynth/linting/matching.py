@@ -10,10 +10,10 @@ from itertools import product
 
 import numpy as np
 
-from ..budgets import MOST_SENSES, SLIDES
-from ..geometry.vectors import Array, pose
+from ..budgets import AXIS_SENSE_CHOICES_MAX, CENTRE_ALIGNMENT_STEPS_MAX
+from ..geometry.vectors import Array, build_pose
 from ..mechanism.model import Joint, JointType, Mechanism
-from ..tolerances import EXACT, NOISE, SAME_ROBOT, TURNING_ARM
+from ..tolerances import EXACT_INCIDENCE_TOL, INCIDENCE_TOL, ROBOT_DIFFERENCE_TOL, ROTATION_LEVER_MIN_FRACTION
 
 _ALONG = (JointType.REVOLUTE, JointType.CYLINDRICAL)
 _LINES = (*_ALONG, JointType.PRISMATIC)
@@ -60,7 +60,7 @@ class RobotMatch:
             same = [
                 each.name
                 for each in theirs
-                if each.type is joint.type and _miss(joint, each, np.eye(4), self.one.length) <= NOISE
+                if each.type is joint.type and _measure_miss(joint, each, np.eye(4), self.one.length) <= INCIDENCE_TOL
             ]
             if len(same) == 1:
                 near[joint.name] = same[0]
@@ -70,8 +70,8 @@ class RobotMatch:
     def _match_by_structure(self, found: Mapping[str, str]) -> dict[str, str]:
         mine, theirs = self._remaining(found)
         pairs = {name: number for number, pair in enumerate(found.items()) for name in [pair]}
-        a = _colours(self.one, {pair[0]: number for pair, number in pairs.items()})
-        b = _colours(self.other, {pair[1]: number for pair, number in pairs.items()})
+        a = _label_joints(self.one, {pair[0]: number for pair, number in pairs.items()})
+        b = _label_joints(self.other, {pair[1]: number for pair, number in pairs.items()})
         often, there = Counter(a.values()), Counter(b.values())
         by_colour = {b[joint.name]: joint.name for joint in theirs}
         return {
@@ -98,7 +98,7 @@ class RobotMatch:
     def _pairs(self, link: str) -> list[tuple[_JointOn, _JointOn]]:
         """Return the joints of a link in both robots, as it carries them."""
         return [
-            (_on(joint, link), _on(other, self.links[link]))
+            (_join_to_link(joint, link), _join_to_link(other, self.links[link]))
             for joint in self.one.joints_of(link)
             if joint.name in self.joints
             and (other := self.other.joints[self.joints[joint.name]]).type is joint.type
@@ -115,10 +115,13 @@ class RobotMatch:
         # axes have no sense of their own: as both files give them, as they lie in the robot as a whole, or any
         found = [_fit(pairs, self.one.length, signs) for signs in (None, upright)]
         best = min(max(each.misses.values()) for each in found)
-        if best > SAME_ROBOT and (count := sum(len(mine.axes) for mine, _ in pairs)) <= MOST_SENSES:
+        if (
+            best > ROBOT_DIFFERENCE_TOL
+            and (count := sum(len(mine.axes) for mine, _ in pairs)) <= AXIS_SENSE_CHOICES_MAX
+        ):
             found += self._fits(pairs, product((1.0, -1.0), repeat=count))
             best = min(max(each.misses.values()) for each in found)
-        good = [each for each in found if max(each.misses.values()) <= best + NOISE * SAME_ROBOT]
+        good = [each for each in found if max(each.misses.values()) <= best + INCIDENCE_TOL * ROBOT_DIFFERENCE_TOL]
         return max(good, key=lambda each: float(np.trace(upright.T @ each.X[:3, :3])))
 
     def _fits(self, pairs: Sequence[tuple[_JointOn, _JointOn]], ways: Iterable[Sequence[float]]) -> list[LinkFit]:
@@ -137,19 +140,19 @@ class RobotMatch:
             pairs = self._pairs(link)
             if hinge not in [mine.name for mine, _ in pairs]:
                 return 0.0
-            gain = max(gain, _gain(hinge, pairs, self.one.length))
+            gain = max(gain, _bound_gain(hinge, pairs, self.one.length))
             count = sum(len(mine.axes) for mine, _ in pairs)
-            ways = product((1.0, -1.0), repeat=count) if count <= MOST_SENSES else [(1.0,) * count]
+            ways = product((1.0, -1.0), repeat=count) if count <= AXIS_SENSE_CHOICES_MAX else [(1.0,) * count]
             mine, their = next(pair for pair in pairs if pair[0].name == hinge)
             sides.append(
                 [
                     float((mine.point - fit.X[:3, :3] @ their.point - fit.X[:3, 3]) @ mine.axis)
                     for fit in self._fits(pairs, ways)
-                    if max(fit.misses.values()) <= SAME_ROBOT
+                    if max(fit.misses.values()) <= ROBOT_DIFFERENCE_TOL
                 ]
             )
         found = min((abs(a - b) for a, b in product(*sides)), default=0.0) / self.one.length
-        return found if found > SAME_ROBOT * gain else 0.0
+        return found if found > ROBOT_DIFFERENCE_TOL * gain else 0.0
 
     @cached_property
     def _upright(self) -> Array:
@@ -162,8 +165,11 @@ def _fit(pairs: Sequence[tuple[_JointOn, _JointOn]], length: float, upright: Arr
     """Return the best fit of a link's joints; the centre of a revolute or prismatic joint may be any point of its
     axis."""
     shift, X, only = np.zeros(len(pairs)), np.eye(4), False
-    for _ in range(SLIDES):
-        points = [(mine.point, their.point + s * _slide(their)) for (mine, their), s in zip(pairs, shift, strict=True)]
+    for _ in range(CENTRE_ALIGNMENT_STEPS_MAX):
+        points = [
+            (mine.point, their.point + s * _get_slide_axis(their))
+            for (mine, their), s in zip(pairs, shift, strict=True)
+        ]
         axes = [(mine, their) for pair in pairs for mine, their in zip(pair[0].axes, pair[1].axes, strict=True)]
         X, only = _fit_motion(points, axes, length, upright)
         before = shift.copy()
@@ -171,11 +177,14 @@ def _fit(pairs: Sequence[tuple[_JointOn, _JointOn]], length: float, upright: Arr
             if their.type in _LINES:
                 moved = X[:3, :3] @ their.point + X[:3, 3]
                 shift[number] = float((mine.point - moved) @ (X[:3, :3] @ their.axis))
-        if np.max(np.abs(shift - before)) <= EXACT * length:
+        if np.max(np.abs(shift - before)) <= EXACT_INCIDENCE_TOL * length:
             break
     return LinkFit(
         X,
-        {mine.name: max(_miss(mine, their, X, length), abs(mine.cosine - their.cosine)) for mine, their in pairs},
+        {
+            mine.name: max(_measure_miss(mine, their, X, length), abs(mine.cosine - their.cosine))
+            for mine, their in pairs
+        },
         only,
     )
 
@@ -197,7 +206,7 @@ class _JointOn:
         return self.axes[0]
 
 
-def _on(joint: Joint, link: str) -> _JointOn:
+def _join_to_link(joint: Joint, link: str) -> _JointOn:
     if joint.type is not JointType.UNIVERSAL:
         return _JointOn(joint.name, joint.type, joint.point, joint.axes)
     own = joint.axes[joint.links.index(link)]
@@ -213,7 +222,7 @@ def _turn_senses(
         yield mine, replace(their, axes=tuple(next(given) * axis for axis in their.axes))
 
 
-def _gain(hinge: str, pairs: Sequence[tuple[_JointOn, _JointOn]], length: float) -> float:
+def _bound_gain(hinge: str, pairs: Sequence[tuple[_JointOn, _JointOn]], length: float) -> float:
     """Return by how much more than its residual a link may be shifted along the axis of one of its revolute joints;
     infinite if its joints do not determine that."""
     rows, asked = [], np.zeros(6)
@@ -230,12 +239,12 @@ def _gain(hinge: str, pairs: Sequence[tuple[_JointOn, _JointOn]], length: float)
         )
         rows += [moved(each) for each in points]
         rows += [np.concatenate([np.zeros(3), each]) for each in across if mine.axes]
-    found = np.linalg.lstsq(np.array(rows).T, asked, rcond=TURNING_ARM)[0]
+    found = np.linalg.lstsq(np.array(rows).T, asked, rcond=ROTATION_LEVER_MIN_FRACTION)[0]
     left = float(np.linalg.norm(asked - found @ np.array(rows)))
-    return np.inf if left > TURNING_ARM**2 else 2.0 * float(np.sum(np.abs(found)))
+    return np.inf if left > ROTATION_LEVER_MIN_FRACTION**2 else 2.0 * float(np.sum(np.abs(found)))
 
 
-def _slide(joint: _JointOn) -> Array:
+def _get_slide_axis(joint: _JointOn) -> Array:
     return np.asarray(joint.axis if joint.type in _LINES else np.zeros(3))
 
 
@@ -246,20 +255,20 @@ def _fit_motion(
     unique. Axes have their sense after the rotation ``upright``, or their own at first."""
     mine, theirs = (np.array([pair[k] for pair in points]) for k in (0, 1))
     H = (theirs - theirs.mean(axis=0)).T @ (mine - mine.mean(axis=0)) / length**2
-    R = upright if upright is not None else _rotation(H + sum((np.outer(b, a) for a, b in axes), np.zeros((3, 3))))
+    R = upright if upright is not None else _fit_rotation(H + sum((np.outer(b, a) for a, b in axes), np.zeros((3, 3))))
     H = H + sum((np.outer(b if a @ R @ b >= 0 else -b, a) for a, b in axes), np.zeros((3, 3)))
-    R = _rotation(H)
+    R = _fit_rotation(H)
     sizes = np.linalg.svd(H, compute_uv=False)
-    return pose(mine.mean(axis=0) - R @ theirs.mean(axis=0), R), bool(sizes[1] > TURNING_ARM**2)
+    return build_pose(mine.mean(axis=0) - R @ theirs.mean(axis=0), R), bool(sizes[1] > ROTATION_LEVER_MIN_FRACTION**2)
 
 
-def _rotation(H: Array) -> Array:
+def _fit_rotation(H: Array) -> Array:
     U, _, Vt = np.linalg.svd(H)
     D = np.diag([1.0, 1.0, float(np.sign(np.linalg.det(Vt.T @ U.T)))])
     return np.asarray(Vt.T @ D @ U.T)
 
 
-def _miss(mine: Joint | _JointOn, their: Joint | _JointOn, X: Array, length: float) -> float:
+def _measure_miss(mine: Joint | _JointOn, their: Joint | _JointOn, X: Array, length: float) -> float:
     """Return the difference of a joint and another robot's joint moved by X: axes as lines without sense."""
     gap = mine.point - (X[:3, :3] @ their.point + X[:3, 3])
     axes = [X[:3, :3] @ axis for axis in their.axes]
@@ -271,7 +280,7 @@ def _miss(mine: Joint | _JointOn, their: Joint | _JointOn, X: Array, length: flo
     return max([float(np.linalg.norm(gap)) / length, *turns])
 
 
-def _colours(robot: Mechanism, known: Mapping[str, int]) -> dict[str, int]:
+def _label_joints(robot: Mechanism, known: Mapping[str, int]) -> dict[str, int]:
     """Return colours of joints by type and neighbours, refined until no colour splits; ``known`` ones are distinct."""
     colours: dict[str, int] = {name: hash((joint.type, known.get(name))) for name, joint in robot.joints.items()}
     ends = {link: hash((link == robot.base, link == robot.platform)) for link in robot.links}

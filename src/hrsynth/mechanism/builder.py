@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..geometry.vectors import pose
+from ..geometry.vectors import build_pose
 from .model import Coupling, Joint, JointType, Link, Mechanism, Motor
 from .observations.direction import Direction
 
@@ -29,7 +29,7 @@ class Builder:
 
     def link(self, name: str, at: ArrayLike = (0, 0, 0), rotation: ArrayLike | None = None) -> None:
         """Add a link whose frame's origin is ``at``, with the axes ``rotation`` (3, 3), at the zero configuration."""
-        self._links.append(Link(name, pose(at, rotation)))
+        self._links.append(Link(name, build_pose(at, rotation)))
 
     def joint(
         self,

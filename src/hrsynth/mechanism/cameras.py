@@ -15,13 +15,23 @@ import numpy as np
 
 from ..errors import BadMechanism, UndefinedValue
 from ..geometry.jets import Jet
-from ..geometry.vectors import Array, Numbers, dot, frozen, hat, inverse, perpendicular, transform, unit
+from ..geometry.vectors import (
+    Array,
+    Numbers,
+    dot,
+    find_perpendicular,
+    freeze_array,
+    hat,
+    invert_pose,
+    normalise_vector,
+    transform,
+)
 from ..results import Value
-from ..tolerances import NEAREST_SEEN, SAME_POINT
+from ..tolerances import IMAGE_DEPTH_MIN_M, POINT_DISTANCE_TOL
 from .observation import Drawn, Observation, ObservationRecord
 
-AT_CENTRE = frozen(np.eye(4))
-RING = 48
+AT_CENTRE = freeze_array(np.eye(4))
+CIRCLE_POLYGON_SIDES_COUNT = 48
 """Sides of a polygon by which a circle is drawn."""
 
 
@@ -39,16 +49,16 @@ class NamedCamera(Value):
     line: int | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "pose", frozen(self.pose))
+        object.__setattr__(self, "pose", freeze_array(self.pose))
 
     def carried_by(self, into: Mapping[str, str], poses: Mapping[str, Array]) -> NamedCamera:
         """Return the camera where links became parts of others, as for observations."""
-        return replace(self, link=into[self.link], pose=relative_pose(self.link, into, poses) @ self.pose)
+        return replace(self, link=into[self.link], pose=compute_relative_pose(self.link, into, poses) @ self.pose)
 
 
-def relative_pose(link: str, into: Mapping[str, str], poses: Mapping[str, Array]) -> Array:
+def compute_relative_pose(link: str, into: Mapping[str, str], poses: Mapping[str, Array]) -> Array:
     """Return the pose of a link in the frame of the one that took it in."""
-    return AT_CENTRE if into[link] == link else inverse(poses[into[link]]) @ poses[link]
+    return AT_CENTRE if into[link] == link else invert_pose(poses[into[link]]) @ poses[link]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +85,7 @@ class ViewGeometry:
     @property
     def ray(self) -> Array:
         """Unit vector from C to B."""
-        return unit(self.B - self.C)
+        return normalise_vector(self.B - self.C)
 
     @property
     def foot(self) -> Array:
@@ -99,33 +109,33 @@ class FixedValueLocus:
     turns: bool = False
 
 
-def kept_in(place: Array, through: Array, *across: Array) -> FixedValueLocus:
+def make_plane_locus(place: Array, through: Array, *across: Array) -> FixedValueLocus:
     """Return the locus of a point in planes with these normals, of any length: three fix it, two leave it a line."""
-    return FixedValueLocus(place, np.array([unit(n) for n in across]), through)
+    return FixedValueLocus(place, np.array([normalise_vector(n) for n in across]), through)
 
 
-def turned_across(d: Array, *across: Array) -> FixedValueLocus:
+def make_angle_locus(d: Array, *across: Array) -> FixedValueLocus:
     """Return the locus of a direction that keeps its angles with these vectors, of any length."""
-    return FixedValueLocus(d, np.array([unit(n) for n in across]), np.zeros(3), turns=True)
+    return FixedValueLocus(d, np.array([normalise_vector(n) for n in across]), np.zeros(3), turns=True)
 
 
-def in_plane(at: ViewGeometry, n: Array) -> tuple[FixedValueLocus, ...]:
+def make_line_locus(at: ViewGeometry, n: Array) -> tuple[FixedValueLocus, ...]:
     """Return the loci of the line (B, d) in the plane with this normal."""
-    return kept_in(at.B, at.B, n), turned_across(at.d, n)
+    return make_plane_locus(at.B, at.B, n), make_angle_locus(at.d, n)
 
 
-def gimbal(at: Array, turned: Array, far: Array | None, actuated: bool = False) -> VirtualJoint:
+def make_universal(at: Array, turned: Array, far: Array | None, actuated: bool = False) -> VirtualJoint:
     """Return a U at a point that rotates a direction any way: its first axis e₁ far from it, its second normal to
     both."""
-    first = perpendicular(turned) if far is None else far
-    return VirtualJoint("U", at, (first, unit(np.cross(first, turned))), actuated)
+    first = find_perpendicular(turned) if far is None else far
+    return VirtualJoint("U", at, (first, normalise_vector(np.cross(first, turned))), actuated)
 
 
-def across(at: ViewGeometry, normal: Array, out: Array, actuated: int) -> tuple[VirtualJoint, ...]:
+def make_line_chain(at: ViewGeometry, normal: Array, out: Array, actuated: int) -> tuple[VirtualJoint, ...]:
     """Return U-R-P-C to the line (B, d): U at C rotates the ``normal`` of a plane through C, R rotates in it, P
     translates along ``out`` in it, C lies along the line; the first so many of them actuated."""
     joints = (
-        gimbal(at.C, normal, at.far),
+        make_universal(at.C, normal, at.far),
         VirtualJoint("R", at.C, (normal,)),
         VirtualJoint("P", at.C, (out,)),
         VirtualJoint("C", at.foot, (at.d,)),
@@ -133,49 +143,49 @@ def across(at: ViewGeometry, normal: Array, out: Array, actuated: int) -> tuple[
     return tuple(replace(joint, actuated=number < actuated) for number, joint in enumerate(joints))
 
 
-def stretch(p: Array, d: Array, size: float) -> Array:
+def draw_line_piece(p: Array, d: Array, size: float) -> Array:
     """Return a segment (2, 3) of a line about p."""
     return np.array([p - size * d, p + size * d])
 
 
-def ring(p: Array, d: Array, r: float) -> Array:
+def draw_circle(p: Array, d: Array, r: float) -> Array:
     """Return a circle as a polyline (n, 3)."""
-    one = perpendicular(d)
-    turns = np.linspace(0, 2 * np.pi, RING + 1)
+    one = find_perpendicular(d)
+    turns = np.linspace(0, 2 * np.pi, CIRCLE_POLYGON_SIDES_COUNT + 1)
     return np.asarray(p + abs(r) * (np.outer(np.cos(turns), one) + np.outer(np.sin(turns), np.cross(d, one))))
 
 
-def before_camera(points: Array) -> Array:
+def cut_at_camera(points: Array) -> Array:
     """Return the part of a polyline (n, 3) in front of the camera; of a segment that part, else all or nothing."""
-    ahead = points[:, 2] > NEAREST_SEEN
+    ahead = points[:, 2] > IMAGE_DEPTH_MIN_M
     if len(points) == 2 and ahead.sum() == 1:
         a, b = points[ahead][0], points[~ahead][0]
-        return np.array([a, a + (a[2] - NEAREST_SEEN) / (a[2] - b[2]) * (b - a)])
+        return np.array([a, a + (a[2] - IMAGE_DEPTH_MIN_M) / (a[2] - b[2]) * (b - a)])
     return points if ahead.all() else points[:0]
 
 
-def depth_plane(z: Numbers) -> Array:
+def make_depth_plane(z: Numbers) -> Array:
     """Return g of the planes (…, 3) parallel to the image plane at depths z (…, 1)."""
     return np.asarray(np.eye(3)[2] / z)
 
 
-def line_plane(p: Array, d: Array) -> Array:
+def make_line_plane(p: Array, d: Array) -> Array:
     """Return g of the plane through a line (p, d) that is normal to that of C and the line: f/‖f‖², f the point of the
     line nearest to C."""
     foot = p - dot(p, d)[..., None] * d
     return np.asarray(foot / dot(foot, foot)[..., None])
 
 
-def on_plane(n: Array, g: Array) -> Array:
+def find_nearest_on_line(n: Array, g: Array) -> Array:
     """Return the point nearest to C of the line in which the plane of normal n through C meets that of g."""
     inside = g - dot(g, n)[..., None] * n
     return np.asarray(inside / dot(inside, inside)[..., None])
 
 
-def apart(at: ViewGeometry, from_: Array, least: float, what: str, limit: str) -> float:
+def require_distance(at: ViewGeometry, from_: Array, least: float, what: str, limit: str) -> float:
     """Return the distance of C from a point. Raises ``BadMechanism`` if it is not larger than ``least``."""
     distance = float(np.linalg.norm(from_ - at.C))
-    if not distance > least + SAME_POINT * (1 + least):
+    if not distance > least + POINT_DISTANCE_TOL * (1 + least):
         raise BadMechanism(f"{what}: distance from the camera centre (m)", distance, limit)
     return distance
 
@@ -201,16 +211,16 @@ class CameraObservation(Observation):
     images_point: ClassVar[bool] = True
     """B itself is in the image, not any point of a line."""
 
-    at: Array = field(default_factory=lambda: frozen(np.zeros(3)), kw_only=True)
+    at: Array = field(default_factory=lambda: freeze_array(np.zeros(3)), kw_only=True)
     axis: Array | None = field(default=None, kw_only=True)
     radius: float | None = field(default=None, kw_only=True)
     camera: NamedCamera | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "at", frozen(self.at))
+        object.__setattr__(self, "at", freeze_array(self.at))
         if self.axis is not None:
             try:
-                object.__setattr__(self, "axis", frozen(unit(self.axis)))
+                object.__setattr__(self, "axis", freeze_array(normalise_vector(self.axis)))
             except ValueError:
                 raise BadMechanism(f"{self.kind} {self.leg!r}: axis", "0 0 0", "a non-zero vector") from None
         if self.camera is not None:
@@ -248,7 +258,8 @@ class CameraObservation(Observation):
 
     @staticmethod
     def error_jets(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
-        """Return :meth:`error` by formula, with its derivatives by the coordinates of p and d in the camera's frame."""
+        """Return :meth:`describe_pose_error` by formula, with its derivatives by the coordinates of p and d in the
+        camera's frame."""
         raise NotImplementedError
 
     def wrenches(self, at: ViewGeometry) -> list[Numbers]:
@@ -290,27 +301,29 @@ class CameraObservation(Observation):
 
     def image(self, X_reference: Array, X_link: Array, size: float) -> list[Array]:
         every = self.polylines(*self._place(X_reference @ self.view, X_link), size)
-        return [each[:, :2] / each[:, 2:] for each in map(before_camera, every) if len(each)]
+        return [each[:, :2] / each[:, 2:] for each in map(cut_at_camera, every) if len(each)]
 
     def _place(self, X_camera: Array, X_link: Array) -> tuple[Array, Array, float]:
         """Return p and d in the camera's frame, and r."""
-        X = inverse(X_camera) @ X_link
+        X = invert_pose(X_camera) @ X_link
         axis = np.zeros(3) if self.axis is None else X[:3, :3] @ self.axis
         return transform(X, self.at), axis, self.radius or 0.0
 
     def ahead(self, X_reference: Array, X_link: Array) -> float:
         """Return the sine of the angle by which the ray to B is in front of the focal plane; if the image size is
         known, the least of the sines by which it is inside of its four sides."""
-        p = transform(inverse(X_reference @ self.view), transform(X_link, self.at))
+        p = transform(invert_pose(X_reference @ self.view), transform(X_link, self.at))
         camera, sides = self.camera, [np.array([0.0, 0.0, 1.0])]
         if camera is not None and camera.focal and camera.width and camera.height:
             halves = np.array([camera.width, camera.height]) / (2 * camera.focal)
-            sides = [unit([*(sign * np.eye(2)[i]), half]) for i, half in enumerate(halves) for sign in (-1, 1)]
-        return float(np.min(np.array(sides) @ p) / max(float(np.linalg.norm(p)), SAME_POINT))
+            sides = [
+                normalise_vector([*(sign * np.eye(2)[i]), half]) for i, half in enumerate(halves) for sign in (-1, 1)
+            ]
+        return float(np.min(np.array(sides) @ p) / max(float(np.linalg.norm(p)), POINT_DISTANCE_TOL))
 
     def plane_at(self, X_reference: Array, X_link: Array) -> Array | None:
         """Return :meth:`plane` at these poses of camera and link, (3,)."""
-        X = inverse(X_reference @ self.view) @ X_link
+        X = invert_pose(X_reference @ self.view) @ X_link
         d = X[:3, :3] @ self.axis if self.axis is not None else np.zeros(3)
         return self.plane(transform(X, self.at), d, np.array([self.radius or 0.0]))
 
@@ -382,7 +395,7 @@ class CameraObservation(Observation):
         return values.ravel(), rates.reshape(len(at) * cls.size, V_links.shape[2])
 
     def carried_by(self, into: Mapping[str, str], poses: Mapping[str, Array]) -> Self:
-        X = relative_pose(self.link, into, poses)
+        X = compute_relative_pose(self.link, into, poses)
         return replace(
             super().carried_by(into, poses),
             at=transform(X, self.at),
@@ -429,10 +442,10 @@ def _stack_observations(observations: tuple[Observation, ...]) -> tuple[Array, A
     sights = [o for o in observations if isinstance(o, CameraObservation)]
     axes = [o.axis if o.axis is not None else np.zeros(3) for o in sights]
     return (
-        frozen([o.at[:, None] for o in sights]),
-        frozen([axis[:, None] for axis in axes]),
-        frozen([[o.radius or 0.0] for o in sights]),
-        frozen([o.view for o in sights]),
+        freeze_array([o.at[:, None] for o in sights]),
+        freeze_array([axis[:, None] for axis in axes]),
+        freeze_array([[o.radius or 0.0] for o in sights]),
+        freeze_array([o.view for o in sights]),
     )
 
 
@@ -440,11 +453,11 @@ def normalise_rates(w: Array) -> tuple[Array, Array]:
     """Return w/‖w‖ (…, 3) of vectors w, and the factor of its rate on ẇ: (I − n nᵀ)/‖w‖, (…, 3, 3). Raises
     ``UndefinedValue`` if a w vanishes."""
     size = np.linalg.norm(w, axis=-1, keepdims=True)
-    if not np.all(size > SAME_POINT):
+    if not np.all(size > POINT_DISTANCE_TOL):
         raise UndefinedValue(
             "a point or line in the image: distance from the camera centre (m)",
             float(size.min()),
-            f"more than {SAME_POINT:g}",
+            f"more than {POINT_DISTANCE_TOL:g}",
         )
     n = w / size
     return n, (np.eye(3) - n[..., :, None] * n[..., None, :]) / size[..., None]

@@ -14,10 +14,10 @@ import numpy as np
 
 from ..geometry import lines
 from ..geometry.vectors import Array, cross
-from ..tolerances import SAME_POINT
+from ..tolerances import POINT_DISTANCE_TOL
 from . import graphs
 from .model import JointType, Mechanism
-from .normal import centre_pair
+from .normal import locate_centre_pair
 from .notation import Bar, Carrier, Letter, Rods, Word
 
 
@@ -62,7 +62,7 @@ class WordGraph:
         self._carriers: list[WordEdge] = []
         for joint in mechanism.joints.values():
             if joint.type is not JointType.FREE and set(joint.links) <= inside:
-                letter = Letter(joint.type.value, joint.actuated)
+                letter = Letter(joint.type.value, joint.is_actuated)
                 self._add(WordEdge(joint.predecessor, joint.successor, Word((letter,)), (joint.name,)))
 
     def _add(self, edge: WordEdge) -> None:
@@ -99,7 +99,7 @@ class WordGraph:
 
     def adjacency(self) -> graphs.Adjacency:
         """Return the links that are left, each with its neighbours."""
-        return graphs.adjacency(self._at, ((edge.tail, edge.head) for edge in self.edges()))
+        return graphs.build_adjacency(self._at, ((edge.tail, edge.head) for edge in self.edges()))
 
     def keep(self, joints: Collection[str]) -> None:
         """Remove the edges of other joints than these."""
@@ -164,11 +164,11 @@ class WordGraph:
             yield tail, head, rods
 
     def _vector(self, rod: BinaryLink) -> tuple[Array, Array]:
-        near, far = centre_pair(self.mechanism.joints[rod.near], self.mechanism.joints[rod.far])
+        near, far = locate_centre_pair(self.mechanism.joints[rod.near], self.mechanism.joints[rod.far])
         return near, far - near
 
     def _rods(self) -> Iterator[tuple[WordEdge, list[str]]]:
-        tolerance = SAME_POINT * self.mechanism.length
+        tolerance = POINT_DISTANCE_TOL * self.mechanism.length
         for tail, head, rods in self._groups({"S", "U"}):
             for rod in rods:
                 near, vector = self._vector(rod)
@@ -195,7 +195,7 @@ class WordGraph:
     def _rod_word(self, rod: BinaryLink) -> Word:
         return Word(
             tuple(
-                Letter(self.mechanism.joints[name].type.value, self.mechanism.joints[name].actuated)
+                Letter(self.mechanism.joints[name].type.value, self.mechanism.joints[name].is_actuated)
                 for name in (rod.near, rod.far)
             )
         )
@@ -205,11 +205,11 @@ class WordGraph:
 
     def _parallelograms(self) -> Iterator[tuple[WordEdge, list[str]]]:
         joints = self.mechanism.joints
-        tolerance = SAME_POINT * self.mechanism.length
+        tolerance = POINT_DISTANCE_TOL * self.mechanism.length
         for tail, head, cranks in self._groups({"R"}):
             for one, two in combinations(cranks, 2):
                 axis = joints[one.near].axis
-                if not all(lines.parallel(axis, joints[name].axis) for name in (one.far, two.near, two.far)):
+                if not all(lines.is_parallel(axis, joints[name].axis) for name in (one.far, two.near, two.far)):
                     continue
                 (a, along), (b, beside) = self._vector(one), self._vector(two)
                 flat = np.eye(3) - np.outer(axis, axis)
@@ -218,7 +218,7 @@ class WordGraph:
                     and np.linalg.norm(cross(flat @ along, flat @ (b - a))) > tolerance**2
                     and np.linalg.norm(flat @ along) > tolerance
                 ):
-                    motor = any(joints[n].actuated for c in (one, two) for n in (c.near, c.far))
+                    motor = any(joints[n].is_actuated for c in (one, two) for n in (c.near, c.far))
                     names = tuple(n for c in (one, two) for n in (c.near, c.far))
                     links = [one.link, two.link]
                     yield WordEdge(tail, head, Word((Letter("Pi", motor),)), names, tuple(links)), links

@@ -22,7 +22,7 @@ class Bond(Protocol):
 B = TypeVar("B", bound=Bond)
 
 
-def adjacency(nodes: Iterable[str], pairs: Iterable[Iterable[str]]) -> dict[str, dict[str, None]]:
+def build_adjacency(nodes: Iterable[str], pairs: Iterable[Iterable[str]]) -> dict[str, dict[str, None]]:
     """The graph with these nodes and edges; ends of edges that are no nodes yet become nodes."""
     graph: dict[str, dict[str, None]] = {node: {} for node in nodes}
     for a, b in pairs:
@@ -31,7 +31,7 @@ def adjacency(nodes: Iterable[str], pairs: Iterable[Iterable[str]]) -> dict[str,
     return graph
 
 
-def distances(graph: Adjacency, start: str, within: Container[str] | None = None) -> dict[str, int]:
+def count_edges(graph: Adjacency, start: str, within: Container[str] | None = None) -> dict[str, int]:
     """The number of edges from ``start`` to each node that can be reached, nearest first."""
     found = {start: 0}
     pending = [start]
@@ -43,17 +43,17 @@ def distances(graph: Adjacency, start: str, within: Container[str] | None = None
     return found
 
 
-def component(graph: Adjacency, start: str, within: Container[str] | None = None) -> set[str]:
+def find_component(graph: Adjacency, start: str, within: Container[str] | None = None) -> set[str]:
     """Return the nodes that can be reached from ``start``, itself included."""
-    return set(distances(graph, start, within))
+    return set(count_edges(graph, start, within))
 
 
-def components(graph: Adjacency, within: Container[str] | None = None) -> Iterator[set[str]]:
+def list_components(graph: Adjacency, within: Container[str] | None = None) -> Iterator[set[str]]:
     """Return the connected parts, in the order of their first nodes."""
     seen: set[str] = set()
     for node in graph:
         if node not in seen and (within is None or node in within):
-            part = component(graph, node, within)
+            part = find_component(graph, node, within)
             seen |= part
             yield part
 
@@ -61,11 +61,11 @@ def components(graph: Adjacency, within: Container[str] | None = None) -> Iterat
 def is_bridge(pairs: Sequence[tuple[str, str]], place: int) -> bool:
     """Return True if nothing else connects the two ends of the edge at this index among all edges."""
     one, other = pairs[place]
-    rest = adjacency((one,), (pair for k, pair in enumerate(pairs) if k != place))
-    return other not in component(rest, one)
+    rest = build_adjacency((one,), (pair for k, pair in enumerate(pairs) if k != place))
+    return other not in find_component(rest, one)
 
 
-def paths(graph: Adjacency, start: str, end: str, within: Container[str] | None = None) -> Iterator[list[str]]:
+def list_paths(graph: Adjacency, start: str, end: str, within: Container[str] | None = None) -> Iterator[list[str]]:
     """Yield all paths from ``start`` to ``end`` that visit no node twice, depth first."""
     way, ahead = [start], [iter(graph[start])]
     while ahead:
@@ -80,16 +80,16 @@ def paths(graph: Adjacency, start: str, end: str, within: Container[str] | None 
             ahead.append(iter(graph[node]))
 
 
-def shortest_path(graph: Adjacency, start: str, end: str) -> list[str]:
+def find_shortest_path(graph: Adjacency, start: str, end: str) -> list[str]:
     """Return a path from ``start`` to ``end`` with the fewest edges. Raises ``KeyError`` if there is none."""
-    left = distances(graph, end)
+    left = count_edges(graph, end)
     way = [start]
     for remaining in range(left[start] - 1, -1, -1):
         way.append(next(node for node in graph[way[-1]] if left[node] == remaining))
     return way
 
 
-def spanning_forest(nodes: Iterable[str], bonds: Sequence[B], weights: Sequence[float]) -> list[B]:
+def build_spanning_forest(nodes: Iterable[str], bonds: Sequence[B], weights: Sequence[float]) -> list[B]:
     """Return the bonds of a minimum spanning forest, lightest first (Kruskal); among equals that of the earlier node,
     then of the pair that is connected first."""
     place = {node: i for i, node in enumerate(nodes)}
@@ -99,20 +99,20 @@ def spanning_forest(nodes: Iterable[str], bonds: Sequence[B], weights: Sequence[
     tree = {node: node for node in place}
     chosen = []
     for *_, i in sorted(ranked):
-        a, b = (_root(tree, link) for link in bonds[i].links)
+        a, b = (_find_root(tree, link) for link in bonds[i].links)
         if a != b:
             tree[b] = a
             chosen.append(bonds[i])
     return chosen
 
 
-def _root(tree: dict[str, str], node: str) -> str:
+def _find_root(tree: dict[str, str], node: str) -> str:
     while tree[node] != node:
         node = tree[node]
     return node
 
 
-def outward(root: str, bonds: Iterable[B]) -> list[tuple[B, str, str]]:
+def order_outward(root: str, bonds: Iterable[B]) -> list[tuple[B, str, str]]:
     """Return the bonds of a tree breadth first from ``root``: each with its near and its far link."""
     table: dict[str, list[B]] = {}
     for bond in bonds:

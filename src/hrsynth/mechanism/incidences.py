@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry import lines
-from ..geometry.incidences import Incidence, Sieve, choices, incidences
-from ..geometry.vectors import Array, cross, dot, inverse, transform, triple, unit
-from ..tolerances import RANK_GAP, SAME_DIRECTION, SAME_PLANE, SAME_POINT
+from ..geometry.incidences import Incidence, Sieve, find_incidences, list_choices
+from ..geometry.vectors import Array, cross, dot, invert_pose, normalise_vector, transform, triple
+from ..tolerances import DIRECTION_SINE_TOL, DRAWING_PLANE_SINE_TOL, POINT_DISTANCE_TOL, RANK_GAP_MIN
 from . import graphs
 from .model import Joint, JointType, Mechanism
 from .observations.direction import SeenAxis
@@ -92,10 +92,10 @@ def recognise(
     ``point`` is the platform's point in the platform's frame, for a point body; ``points`` are further ones, with their
     links, in whose frames they are: they are the last centres.
     """
-    drawn, sieve = _Drawing(mechanism, poses, point), Sieve()
+    drawn, sieve = _SampledGeometry(mechanism, poses, point), Sieve()
     for link, at in points:
         drawn.add_point(link, np.asarray(at))
-    classes, members = _parallels(sieve, np.array(drawn.directions).reshape(-1, drawn.size, 3))
+    classes, members = _group_parallels(sieve, np.array(drawn.directions).reshape(-1, drawn.size, 3))
     axes = {name: tuple(members[i] for i in numbers) for name, numbers in drawn.axes.items()}
     centres = np.array(drawn.points).reshape(len(drawn.points), drawn.size, 3) / mechanism.length
     further = len(points)
@@ -104,7 +104,7 @@ def recognise(
         for number, link in zip(numbers, mechanism.joints[name].links, strict=False):
             fixed[number].append(link)
     for link, normal in drawn.planes():
-        if not any(np.max(np.abs(cross(normal, each))) < SAME_DIRECTION for each in classes):
+        if not any(np.max(np.abs(cross(normal, each))) < DIRECTION_SINE_TOL for each in classes):
             classes = np.concatenate([classes, normal[None]])
             fixed.append([link])
     sights: list[DirectionSource] = []
@@ -112,7 +112,7 @@ def recognise(
         u = drawn.turned(observation)
         own = [i for i, links in enumerate(drawn.hosts) if observation.link in links]
         near = sorted({c for joint in mechanism.joints_of(observation.link) for c in axes[joint.name]})
-        sight = _sight(u, classes, centres, own, near)
+        sight = _find_direction_source(u, classes, centres, own, near)
         if sight is None:
             sight = DirectionSource("class", classes=(len(classes),))
             classes = np.concatenate([classes, u[None]])
@@ -120,13 +120,13 @@ def recognise(
         if sight.kind == "class":
             fixed[sight.classes[0]].append(observation.link)
         sights.append(sight)
-    tower, place = _tower(sieve, classes)
+    tower, place = _order_classes(sieve, classes)
     owns = [set(axes[name]) for name in drawn.centres]
     slides = [
         own if mechanism.joints[name].type in AXIAL else set() for name, own in zip(drawn.centres, owns, strict=True)
     ]
     bare = [set[int]()] * (len(centres) - len(owns))
-    found = incidences(sieve, classes, centres, drawn.together(), owns + bare, slides + bare)
+    found = find_incidences(sieve, classes, centres, drawn.together(), owns + bare, slides + bare)
     order = sorted(place, key=place.__getitem__)
 
     def placed(numbers: Iterable[int]) -> tuple[int, ...]:
@@ -144,33 +144,33 @@ def recognise(
         tuple(tuple(fixed[i]) for i in order),
         tuple(o.link for o in observations),
         classes[order],
-        _doubt(sieve),
+        _explain_doubt(sieve),
         sieve.accepted,
         sieve.rejected,
     )
 
 
-def _doubt(sieve: Sieve) -> str:
+def _explain_doubt(sieve: Sieve) -> str:
     """Return the reason why the result is not reliable (docs/pages/proofs.md, section 12)."""
     if sieve.mixed is not None:
         return (
             "the samples are of several operation modes: an incidence of its geometry holds at zero and at "
             "{} of {} of them".format(*sieve.mixed)
         )
-    if sieve.rejected < RANK_GAP * sieve.accepted:
+    if sieve.rejected < RANK_GAP_MIN * sieve.accepted:
         return (
             f"its geometry is nearly special: an incidence that holds has a defect of {sieve.accepted:.1e}, one "
-            f"that does not of {sieve.rejected:.1e}, needed: {RANK_GAP:.0e} times as much"
+            f"that does not of {sieve.rejected:.1e}, needed: {RANK_GAP_MIN:.0e} times as much"
         )
     return ""
 
 
-class _Drawing:
+class _SampledGeometry:
     """Directions and centres of a mechanism at all configurations."""
 
     def __init__(self, mechanism: Mechanism, poses: Mapping[str, Array], point: Array | None) -> None:
         self.mechanism = mechanism
-        moved = {name: poses[name] @ inverse(link.pose) for name, link in mechanism.links.items()}
+        moved = {name: poses[name] @ invert_pose(link.pose) for name, link in mechanism.links.items()}
         self.turns = {name: X[:, :3, :3] for name, X in moved.items()}
         self.shifts = {name: X[:, :3, 3] for name, X in moved.items()}
         self.size = len(next(iter(poses.values())))
@@ -209,7 +209,7 @@ class _Drawing:
     def _meetings(self) -> list[tuple[str, Array]]:
         """Return points (configurations, 3) at which the axes of three or more R or C meet, and the link of two of
         them."""
-        mechanism, near = self.mechanism, SAME_POINT * self.mechanism.length
+        mechanism, near = self.mechanism, POINT_DISTANCE_TOL * self.mechanism.length
         turning = [joint for joint in mechanism.joints.values() if joint.type in AXIAL]
 
         def on_axis(point: Array, joint: Joint) -> bool:
@@ -218,7 +218,7 @@ class _Drawing:
 
         found: list[tuple[str, Array]] = []
         for a, b in combinations(turning, 2):
-            centre = lines.meeting_point([(a.point, a.axis), (b.point, b.axis)], near)
+            centre = lines.find_meeting_point([(a.point, a.axis), (b.point, b.axis)], near)
             for link in sorted({*a.links} & {*b.links}) if centre is not None else ():
                 moved = self._at(link, np.asarray(centre))
                 known = any(np.max(np.abs(moved - other)) < near for _, other in found)
@@ -238,8 +238,8 @@ class _Drawing:
     def sliding(self) -> list[set[str]]:
         """Return the sets of links that only translate relative to each other."""
         return list(
-            graphs.components(
-                graphs.adjacency(
+            graphs.list_components(
+                graphs.build_adjacency(
                     self.mechanism.links,
                     (joint.links for joint in self.mechanism.joints.values() if joint.type is JointType.PRISMATIC),
                 )
@@ -258,9 +258,9 @@ class _Drawing:
             for u in slides[1:]:
                 normal = cross(slides[0], u)
                 size = np.linalg.norm(normal, axis=1, keepdims=True)
-                if np.min(size) > SAME_PLANE:
+                if np.min(size) > DRAWING_PLANE_SINE_TOL:
                     normal = normal / size
-                    if all(np.max(np.abs(dot(normal, each))) < SAME_DIRECTION for each in slides):
+                    if all(np.max(np.abs(dot(normal, each))) < DIRECTION_SINE_TOL for each in slides):
                         yield next(link for link in self.mechanism.links if link in body), normal
                     break
 
@@ -271,9 +271,9 @@ class _Drawing:
         return np.asarray(on @ on.T) if len(on) else np.zeros((0, 0), dtype=bool)
 
 
-def _parallels(sieve: Sieve, D: Array) -> tuple[Array, list[int]]:
+def _group_parallels(sieve: Sieve, D: Array) -> tuple[Array, list[int]]:
     """Return one direction of each class of parallels (classes, configurations, 3), and the class of each direction."""
-    pairs = sieve.keep(choices(len(D), 2), lambda c, s: cross(D[c[:, 0], s], D[c[:, 1], s]), SAME_DIRECTION)
+    pairs = sieve.keep(list_choices(len(D), 2), lambda c, s: cross(D[c[:, 0], s], D[c[:, 1], s]), DIRECTION_SINE_TOL)
     first = list(range(len(D)))
     for a, b in pairs.tolist():
         first[b] = min(first[b], first[a])
@@ -281,20 +281,26 @@ def _parallels(sieve: Sieve, D: Array) -> tuple[Array, list[int]]:
     return D[leaders], [leaders.index(i) for i in first]
 
 
-def _tower(sieve: Sieve, classes: Array) -> tuple[tuple[tuple[tuple[int, ...], ...], ...], dict[int, int]]:
+def _order_classes(sieve: Sieve, classes: Array) -> tuple[tuple[tuple[tuple[int, ...], ...], ...], dict[int, int]]:
     """Return the incidence of each class with earlier ones, in an order in which each has a choice, and its place in
     it.
 
     The last is the one that lies in the fewest different planes, and so on with the others.
     """
     n = len(classes)
-    normal = sieve.keep(choices(n, 2), lambda c, s: dot(classes[c[:, 0], s], classes[c[:, 1], s]), SAME_DIRECTION)
-    planar = sieve.keep(choices(n, 3), lambda c, s: triple(*(classes[c[:, i], s] for i in range(3))), SAME_DIRECTION)
+    normal = sieve.keep(
+        list_choices(n, 2), lambda c, s: dot(classes[c[:, 0], s], classes[c[:, 1], s]), DIRECTION_SINE_TOL
+    )
+    planar = sieve.keep(
+        list_choices(n, 3), lambda c, s: triple(*(classes[c[:, i], s] for i in range(3))), DIRECTION_SINE_TOL
+    )
     obeyed: list[list[tuple[frozenset[int], int]]] = [[] for _ in range(n)]
     planes: list[list[Array]] = [[] for _ in range(n)]
     for related in (frozenset(each) for each in normal.tolist() + planar.tolist()):
         for c in related:
-            obeyed[c].append((related - {c}, _number(_normal_of(related - {c}, classes[:, -1]), planes[c])))
+            obeyed[c].append(
+                (related - {c}, _identify_normal(_compute_normal(related - {c}, classes[:, -1]), planes[c]))
+            )
     left, reverse = set(range(n)), list[int]()
     while left:
         last = min(sorted(left, reverse=True), key=lambda c: len({plane for by, plane in obeyed[c] if by <= left}))
@@ -305,28 +311,31 @@ def _tower(sieve: Sieve, classes: Array) -> tuple[tuple[tuple[tuple[int, ...], .
     return tuple(tuple(tuple(sorted(place[c] for c in by)) for by, _ in obeyed[k]) for k in place), place
 
 
-def _normal_of(classes: frozenset[int], directions: Array) -> Array:
+def _compute_normal(classes: frozenset[int], directions: Array) -> Array:
     """Return the normal of one or two classes."""
     first, *rest = (directions[c] for c in sorted(classes))
-    return unit(cross(first, rest[0])) if rest else first
+    return normalise_vector(cross(first, rest[0])) if rest else first
 
 
-def _number(normal: Array, known: list[Array]) -> int:
+def _identify_normal(normal: Array, known: list[Array]) -> int:
     """Return the index of a normal among known ones, to which a new one is added."""
     for number, other in enumerate(known):
-        if np.linalg.norm(cross(normal, other)) < SAME_PLANE:
+        if np.linalg.norm(cross(normal, other)) < DRAWING_PLANE_SINE_TOL:
             return number
     known.append(normal)
     return len(known) - 1
 
 
-def _sight(u: Array, classes: Array, points: Array, own: Sequence[int], near: Sequence[int]) -> DirectionSource | None:
+def _find_direction_source(
+    u: Array, classes: Array, points: Array, own: Sequence[int], near: Sequence[int]
+) -> DirectionSource | None:
     """Return the source of the observed direction (configurations, 3) among the directions of its link."""
 
     def along(vectors: Array) -> bool:
         sizes = np.linalg.norm(vectors, axis=1)
         return bool(
-            np.min(sizes) > SAME_POINT and np.max(np.linalg.norm(cross(vectors, u), axis=1) / sizes) < SAME_DIRECTION
+            np.min(sizes) > POINT_DISTANCE_TOL
+            and np.max(np.linalg.norm(cross(vectors, u), axis=1) / sizes) < DIRECTION_SINE_TOL
         )
 
     for c, direction in enumerate(classes):

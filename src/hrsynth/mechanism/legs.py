@@ -17,7 +17,7 @@ from ..errors import BadMechanism, BadRequest, BadRobotFile, Defect
 from ..geometry import lines
 from ..geometry.vectors import Array
 from ..results import Value, with_value
-from ..tolerances import SAME_POINT
+from ..tolerances import POINT_DISTANCE_TOL
 from . import graphs
 from .composites import WordEdge, WordGraph
 from .model import Joint, JointType, Mechanism
@@ -90,24 +90,24 @@ class LegDecomposition(Value):
         joints = self.mechanism.joints_of(self.mechanism.platform)
         frame = self.mechanism.links[self.mechanism.platform].pose
         first = joints[0]
-        tolerance, turns = SAME_POINT * self.mechanism.length, self.mechanism.turns
-        if turns or (turns is None and len(joints) == 1 and (first.type is JointType.REVOLUTE or first.actuated)):
+        tolerance, turns = POINT_DISTANCE_TOL * self.mechanism.length, self.mechanism.turns
+        if turns or (turns is None and len(joints) == 1 and (first.type is JointType.REVOLUTE or first.is_actuated)):
             return None
         if len(joints) == 1 and first.type is JointType.SPHERICAL:
             centre = first.point
         elif all(
             j.type is JointType.REVOLUTE
-            and lines.parallel(j.axis, first.axis)
-            and lines.distance(j.point, first.point, first.axis) <= tolerance
+            and lines.is_parallel(j.axis, first.axis)
+            and lines.measure_line_distance(j.point, first.point, first.axis) <= tolerance
             for j in joints
         ):
-            centre = lines.foot(frame[:3, 3], first.point, first.axis)
+            centre = lines.project_to_line(frame[:3, 3], first.point, first.axis)
         else:
             return None
         return frame[:3, :3].T @ (centre - frame[:3, 3])
 
     @cached_property
-    def decided(self) -> bool:
+    def is_platform_decided(self) -> bool:
         """The links on which legs end determine the pose of the platform link: it is one of them, or carried by such
         links with two joints R or P, neither coaxial nor along one direction. Other joints may leave several poses."""
         mechanism = self.mechanism
@@ -117,23 +117,23 @@ class LegDecomposition(Value):
                 link
                 for link in waiting
                 if any(
-                    self._hold(one, other)
+                    self._is_held_by(one, other)
                     for one, other in combinations(mechanism.joints_of(link), 2)
                     if {one.other(link), other.other(link)} <= known
                 )
             }
         return mechanism.platform in known
 
-    def _hold(self, one: Joint, other: Joint) -> bool:
+    def _is_held_by(self, one: Joint, other: Joint) -> bool:
         """Return True if two joints with fixed links leave a link one pose."""
         if not {one.type, other.type} <= {JointType.REVOLUTE, JointType.PRISMATIC}:
             return False
-        if one.type is not other.type or not lines.parallel(one.axis, other.axis):
+        if one.type is not other.type or not lines.is_parallel(one.axis, other.axis):
             return True
-        apart = lines.distance(other.point, one.point, one.axis)
-        return one.type is JointType.REVOLUTE and apart > SAME_POINT * self.mechanism.length
+        apart = lines.measure_line_distance(other.point, one.point, one.axis)
+        return one.type is JointType.REVOLUTE and apart > POINT_DISTANCE_TOL * self.mechanism.length
 
-    def floats(self, leg: Leg) -> bool:
+    def is_free_body(self, leg: Leg) -> bool:
         """Return True if a leg is only the free joint of a body without other joints."""
         return not leg.links and any(
             self.mechanism.joints[name].type is JointType.FREE for name in leg.joints if name in self.mechanism.joints
@@ -146,7 +146,7 @@ class LegDecomposition(Value):
         A virtual chain from a camera on another leg is written as if it began at the base.
         """
         mechanism = self.mechanism
-        if self.floats(leg):
+        if self.is_free_body(leg):
             return Word((Letter(JointType.FREE.value),))
         links = {mechanism.base, leg.platform_link, *leg.links}
         kept = {mechanism.base, leg.platform_link}
@@ -163,7 +163,7 @@ class LegDecomposition(Value):
         edges = [edge for _, edge in graph.between(mechanism.base, leg.platform_link)]
         if len(graph) == 2 and len(edges) == 1:
             return edges[0].word_from(mechanism.base)
-        return _paths_word(graph, mechanism.base, leg.platform_link)
+        return _describe_paths(graph, mechanism.base, leg.platform_link)
 
     def architecture(self) -> Architecture:
         """Sum of the legs' notations; a single loop whose legs share their end joint is one term."""
@@ -190,14 +190,14 @@ class LegDecomposition(Value):
         )
         graph.recognise()
         graph.keep(leg.joints)
-        nodes = graphs.shortest_path(graph.adjacency(), mechanism.base, leg.platform_link)
+        nodes = graphs.find_shortest_path(graph.adjacency(), mechanism.base, leg.platform_link)
         return [graph.between(a, b)[0][1] for a, b in pairwise(nodes)]
 
 
-def _paths_word(graph: WordGraph, start: str, end: str) -> Word:
+def _describe_paths(graph: WordGraph, start: str, end: str) -> Word:
     """Return the notation of a graph that neither series nor parallel reduces: its simple paths side by side."""
     words = []
-    for path in graphs.paths(graph.adjacency(), start, end):
+    for path in graphs.list_paths(graph.adjacency(), start, end):
         word = Word(())
         for here, there in pairwise(path):
             word += graph.between(here, there)[0][1].word_from(here)
@@ -211,13 +211,13 @@ def decompose(mechanism: Mechanism) -> LegDecomposition:
     """Return platform and legs of a mechanism in normal form. Raises ``BadMechanism`` if there is no leg,
     ``BadRobotFile`` if the observations contradict the legs."""
     graph = WordGraph(mechanism, {mechanism.base, mechanism.platform}).recognise().recognise_carriers().adjacency()
-    platform = _platform(mechanism, graph)
+    platform = _find_platform(mechanism, graph)
     order = {name: i for i, name in enumerate(mechanism.links)}
     legs: list[Leg] = []
-    for part, joints, end in _parts(mechanism, platform):
+    for part, joints, end in _split_parts(mechanism, platform):
         if end is not None:
             legs.append(Leg("", tuple(sorted(part, key=order.__getitem__)), tuple(j.name for j in joints), end))
-    live = _live(mechanism)
+    live = _list_live_joints(mechanism)
     for joint in live:
         if mechanism.base in joint.links and joint.other(mechanism.base) in platform:
             legs.append(Leg("", (), (joint.name,), joint.other(mechanism.base)))
@@ -231,7 +231,7 @@ def decompose(mechanism: Mechanism) -> LegDecomposition:
             mechanism.platform,
             "a platform with at least one leg",
         )
-    legs = _segment_platform(mechanism, platform, legs)
+    legs = _choose_segment_platform(mechanism, platform, legs)
     joint_order = {name: i for i, name in enumerate(mechanism.joints)}
     legs.sort(
         key=lambda leg: (order[leg.links[0]] if leg.links else order[leg.platform_link], joint_order[leg.joints[0]])
@@ -239,20 +239,20 @@ def decompose(mechanism: Mechanism) -> LegDecomposition:
     return _label_legs(LegDecomposition(mechanism, tuple(sorted(platform, key=order.__getitem__)), tuple(legs)))
 
 
-def _live(mechanism: Mechanism) -> list[Joint]:
+def _list_live_joints(mechanism: Mechanism) -> list[Joint]:
     """Return the joints except those of free bodies."""
     return [j for j in mechanism.joints.values() if j.type is not JointType.FREE]
 
 
-def _parts(mechanism: Mechanism, platform: set[str]) -> list[tuple[set[str], list[Joint], str | None]]:
+def _split_parts(mechanism: Mechanism, platform: set[str]) -> list[tuple[set[str], list[Joint], str | None]]:
     """Yield the parts without base and platform: links, joints, and, for a leg (connected to the base and to one link
     of the platform), its platform link."""
     moving = {name for name in mechanism.links if name != mechanism.base and name not in platform}
-    live, found = _live(mechanism), []
-    joined = graphs.adjacency(
+    live, found = _list_live_joints(mechanism), []
+    joined = graphs.build_adjacency(
         (name for name in mechanism.links if name in moving), (j.links for j in live if moving.issuperset(j.links))
     )
-    for part in graphs.components(joined):
+    for part in graphs.list_components(joined):
         joints = [j for j in live if part & set(j.links)]
         ends = {j.other(link) for j in joints for link in j.links if link in part} - part
         leg = mechanism.base in ends and len(ends) == 2
@@ -260,7 +260,7 @@ def _parts(mechanism: Mechanism, platform: set[str]) -> list[tuple[set[str], lis
     return found
 
 
-def _platform(mechanism: Mechanism, graph: graphs.Adjacency) -> set[str]:
+def _find_platform(mechanism: Mechanism, graph: graphs.Adjacency) -> set[str]:
     """Return the smallest set around the platform link that leaves the most legs (articulated platforms)."""
     base, root = mechanism.base, mechanism.platform
     if base not in graph or root not in graph:
@@ -268,17 +268,20 @@ def _platform(mechanism: Mechanism, graph: graphs.Adjacency) -> set[str]:
     rest = {node: [other for other in graph[node] if other != base] for node in graph if node != base}
     contacts = set(graph[base])
     order = {name: i for i, name in enumerate(mechanism.links)}
-    distance = graphs.distances(rest, root)
+    distance = graphs.count_edges(rest, root)
     reachable = set(distance)
     branching = sorted(
         (n for n in reachable - {root} if len(rest[n]) >= 3 and n not in contacts),
         key=lambda n: (distance[n], order[n]),
     )[:12]
-    watched = {observation.link for observation in mechanism.observations if observation.by_segment} - {base, root}
+    watched = {observation.link for observation in mechanism.observations if observation.is_segment_direction} - {
+        base,
+        root,
+    }
 
     def legs_of(members: set[str]) -> int:
         count = sum(1 for part in graph[base] if part in members)
-        for part in graphs.components(rest, set(rest) - members):
+        for part in graphs.list_components(rest, set(rest) - members):
             if not part & contacts:
                 continue
             ends = {n for link in part for n in rest[link] if n in members}
@@ -294,19 +297,21 @@ def _platform(mechanism: Mechanism, graph: graphs.Adjacency) -> set[str]:
             members |= {
                 n for n in reachable - members - contacts if len(rest[n]) == 2 and all(m in members for m in rest[n])
             }
-            if graphs.component(rest, root, members) != members or (found := legs_of(members)) <= score:
+            if graphs.find_component(rest, root, members) != members or (found := legs_of(members)) <= score:
                 continue
-            if watched <= {link for part, _, end in _parts(mechanism, members) if end is not None for link in part}:
+            if watched <= {
+                link for part, _, end in _split_parts(mechanism, members) if end is not None for link in part
+            }:
                 best, score = members, found
     return best
 
 
-def _segment_platform(mechanism: Mechanism, platform: set[str], legs: list[Leg]) -> list[Leg]:
+def _choose_segment_platform(mechanism: Mechanism, platform: set[str], legs: list[Leg]) -> list[Leg]:
     """Move the platform to the last segment of the shorter leg, in a single loop with one dof more on one side."""
     if len(platform) != 1 or len(legs) != 2 or len(mechanism.joints_of(mechanism.platform)) != 2:
         return legs
     decomposition = LegDecomposition(mechanism, tuple(platform), tuple(legs))
-    one, two = (_freedoms(decomposition.word(leg)) for leg in legs)
+    one, two = (_count_dof(decomposition.word(leg)) for leg in legs)
     if one is None or two is None or abs(one - two) != 1:
         return legs
     short, long = (0, 1) if one < two else (1, 0)
@@ -318,13 +323,13 @@ def _segment_platform(mechanism: Mechanism, platform: set[str], legs: list[Leg])
     return result
 
 
-def _freedoms(word: Word) -> int | None:
+def _count_dof(word: Word) -> int | None:
     """Return the dof of joints in series (a Π has one, a carrier those of its chain), or None for rods side by side."""
     total = 0
     for item in word.items:
         if isinstance(item, Letter):
             total += 1 if item.letter == "Pi" else JointType(item.letter).freedoms
-        elif isinstance(item, Carrier) and (inner := _freedoms(item.chain)) is not None:
+        elif isinstance(item, Carrier) and (inner := _count_dof(item.chain)) is not None:
             total += inner
         else:
             return None
@@ -339,7 +344,7 @@ def _label_legs(decomposition: LegDecomposition) -> LegDecomposition:
     mechanism = decomposition.mechanism
     links = ", ".join(n for leg in decomposition.legs for n in leg.links) or "none"
     file = mechanism.file or mechanism.name
-    for observation in (o for o in mechanism.observations if o.by_segment):
+    for observation in (o for o in mechanism.observations if o.is_segment_direction):
         line = getattr(observation, "line", None)
         index = next(
             (i for i, leg in enumerate(decomposition.legs) if decomposition.leg_of(observation.link) == leg), None
@@ -374,7 +379,7 @@ def _label_legs(decomposition: LegDecomposition) -> LegDecomposition:
                     "one label per leg",
                 )
             )
-        elif isinstance(observation, Direction) and not lines.parallel(
+        elif isinstance(observation, Direction) and not lines.is_parallel(
             watched.setdefault(observation.link, observation.direction), observation.direction
         ):
             defects.append(

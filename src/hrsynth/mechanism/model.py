@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import BadMechanism, BadRequest, NoPlatform
-from ..geometry.vectors import Array, frozen, inverse, unit
-from ..results import Result, Value, content
-from ..tolerances import NO_SPREAD, SAME_GEOMETRY
+from ..geometry.vectors import Array, freeze_array, invert_pose, normalise_vector
+from ..results import Result, Value, freeze_content
+from ..tolerances import CENTRE_SPREAD_MIN_FRACTION, GEOMETRY_DIFFERENCE_TOL
 from .cameras import NamedCamera
-from .graphs import Adjacency, adjacency, component, spanning_forest
+from .graphs import Adjacency, build_adjacency, build_spanning_forest, find_component
 from .observation import Observation
 from .tilt_limit import TiltLimit
 
@@ -47,7 +47,7 @@ class JointType(StrEnum):
         return {"R": 1, "P": 1, "U": 2, "S": 0, "C": 1, "E": 1, "F": 0, "6": 0}[self.value]
 
     @property
-    def slides(self) -> bool:
+    def has_translation(self) -> bool:
         """The joint lets its two links translate along its axis (P and C)."""
         return self.value in ("P", "C")
 
@@ -84,17 +84,17 @@ class Link(Value):
     """Rigid body: its frame's pose X_BL at the zero configuration (4, 4); ``xml`` keeps unknown child elements."""
 
     name: str
-    pose: Array = field(default_factory=lambda: frozen(np.eye(4)))
+    pose: Array = field(default_factory=lambda: freeze_array(np.eye(4)))
     xml: tuple[str, ...] = ()
     line: int | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "pose", frozen(self.pose))
+        object.__setattr__(self, "pose", freeze_array(self.pose))
 
     @cached_property
     def inverse(self) -> Array:
         """X_LB at the zero configuration."""
-        return inverse(self.pose)
+        return invert_pose(self.pose)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -126,13 +126,13 @@ class Joint(Value):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "type", JointType(self.type))
-        object.__setattr__(self, "point", frozen(self.point))
+        object.__setattr__(self, "point", freeze_array(self.point))
         if len(self.axes) != self.type.axes:
             raise BadMechanism(
                 f"joint {self.name!r} of type {self.type.value}: number of axes", len(self.axes), str(self.type.axes)
             )
         try:
-            object.__setattr__(self, "axes", tuple(frozen(unit(axis)) for axis in self.axes))
+            object.__setattr__(self, "axes", tuple(freeze_array(normalise_vector(axis)) for axis in self.axes))
         except ValueError as error:
             raise BadMechanism(f"joint {self.name!r}: axis", str(error), "a non-zero vector") from None
 
@@ -142,7 +142,7 @@ class Joint(Value):
         return self.axes[0]
 
     @property
-    def actuated(self) -> bool:
+    def is_actuated(self) -> bool:
         """A motor drives the joint."""
         return self.motor is not None
 
@@ -165,7 +165,7 @@ class Joint(Value):
         wrist = None if self.wrist is None else self.wrist.turned()
         offset = self.offset
         if offset is not None and self.type is not JointType.CYLINDRICAL:
-            offset = offset[::-1] if offset.ndim == 1 else inverse(offset)
+            offset = offset[::-1] if offset.ndim == 1 else invert_pose(offset)
         return replace(
             self,
             predecessor=self.successor,
@@ -226,22 +226,24 @@ FIRST = PlatformChoice("file", "the first of the bodies that observe or are obse
 """Choice of a formation."""
 
 
-def likely_motors(base: str, joints: Sequence[Any]) -> tuple[list[str], str]:
+def infer_motors(base: str, joints: Sequence[Any]) -> tuple[list[str], str]:
     """Return the joints that could have motors, and which these are: those at the base and links fixed to it; without a
     loop all."""
-    fixed = component(adjacency((base,), (joint.links for joint in joints if joint.type is JointType.FIXED)), base)
+    fixed = find_component(
+        build_adjacency((base,), (joint.links for joint in joints if joint.type is JointType.FIXED)), base
+    )
     moving = (joint for joint in joints if joint.type not in (JointType.FIXED, JointType.FREE))
     if len(joints) < len({link for joint in joints for link in joint.links}):
         return [joint.name for joint in moving], "all joints: no loop is closed"
     return [joint.name for joint in moving if fixed & {*joint.links}], "the joints at the base"
 
 
-def _counted(bound: float, joint: Joint) -> float:
+def _count_from_zero(bound: float, joint: Joint) -> float:
     """Return a limit from the file's zero, to the digits of its addition."""
     return bound if joint.offset is None or joint.offset.size > 1 else float(f"{bound + joint.offset[0]:.15g}")
 
 
-def fresh_name(name: str, *taken: Container[str]) -> str:
+def make_fresh_name(name: str, *taken: Container[str]) -> str:
     """Return ``name``, or ``name_2``, ``name_3`` … if it is taken; not the first of these if names between are free."""
 
     def free(number: int) -> bool:
@@ -295,7 +297,7 @@ class Mechanism(Result, shown_as="robot"):
 
     def headline(self) -> str:
         """Name and number of parts."""
-        motors = sum(joint.actuated for joint in self.joints.values())
+        motors = sum(joint.is_actuated for joint in self.joints.values())
         return f"{self.name}, {len(self.links)} links, {len(self.joints)} joints, {motors} motors"
 
     def to_pinocchio(self) -> Any:
@@ -310,7 +312,7 @@ class Mechanism(Result, shown_as="robot"):
 
     @cached_property
     def _content(self) -> tuple[Any, ...]:
-        return tuple(content(self))
+        return tuple(freeze_content(self))
 
     @cached_property
     def _hash(self) -> int:
@@ -358,37 +360,37 @@ class Mechanism(Result, shown_as="robot"):
     @property
     def platform_words(self) -> str:
         """Platform, or bodies of a formation, and how it was chosen."""
-        bodies = "none" if self.open_platform else ", ".join(self.bodies)
+        bodies = "none" if self.has_open_platform else ", ".join(self.bodies)
         return bodies + ("" if self.choice is None else f" ({self.choice})")
 
     @property
-    def open_platform(self) -> bool:
+    def has_open_platform(self) -> bool:
         """The file names no platform and several links could be it: ``platform`` is only the first of these."""
         return self.choice is not None and self.choice.chosen == "open"
 
     def require_platform(self) -> None:
         """Raise ``NoPlatform`` if the platform is open."""
-        if self.open_platform:
+        if self.has_open_platform:
             raise NoPlatform(f"{self.file or self.name}: {self.choice}")
 
     @property
     def proposed_motors(self) -> str | None:
         """Message that no joint has a motor, and which could; None if there are motors, or no candidates."""
-        names, which = likely_motors(self.base, list(self.joints.values()))
-        if not names or any(joint.actuated for joint in self.joints.values()):
+        names, which = infer_motors(self.base, list(self.joints.values()))
+        if not names or any(joint.is_actuated for joint in self.joints.values()):
             return None
         return f"no joint has a motor: try --motors {','.join(names)} ({which})"
 
     def require_motors(self) -> None:
         """Raise ``BadRequest`` if no joint has a motor."""
-        if not any(joint.actuated for joint in self.joints.values()):
+        if not any(joint.is_actuated for joint in self.joints.values()):
             told = (self.proposed_motors or "").removeprefix("no joint has a motor: ")
             raise BadRequest(f"{self.name}: no motor", remedy=f"Name one or more with --motors{told and f': {told}'}.")
 
     @cached_property
     def adjacency(self) -> Adjacency:
         """Links in order, each with its neighbours."""
-        return adjacency(self.links, (joint.links for joint in self.joints.values()))
+        return build_adjacency(self.links, (joint.links for joint in self.joints.values()))
 
     def carrier(self, coupling: Coupling, link: str) -> Joint:
         """Return the joint whose coordinate a coupling means by a link. Raises ``BadMechanism`` if there is none."""
@@ -424,7 +426,7 @@ class Mechanism(Result, shown_as="robot"):
     def filed(self) -> dict[str, tuple[float, float]]:
         """Joints with limits as in :attr:`joint_ranges`, as the file counts."""
         return {
-            name: (_counted(lower, self.joints[name]), _counted(upper, self.joints[name]))
+            name: (_count_from_zero(lower, self.joints[name]), _count_from_zero(upper, self.joints[name]))
             for name, (lower, upper) in self.joint_ranges.items()
         }
 
@@ -433,14 +435,18 @@ class Mechanism(Result, shown_as="robot"):
         """Floating joints of links that other joints carry: they constrain nothing and have no coordinates."""
         joints = list(self.joints.values())
         floats = [joint.type is JointType.FREE for joint in joints]
-        tree = {joint.name for joint in spanning_forest(self.links, joints, floats)} if any(floats) else self.joints
+        tree = (
+            {joint.name for joint in build_spanning_forest(self.links, joints, floats)} if any(floats) else self.joints
+        )
         return tuple(joint.name for joint in joints if joint.name not in tree and joint.type is JointType.FREE)
 
     @cached_property
     def tilt_limits(self) -> dict[str, TiltLimit]:
         """Spherical joints that cannot make every rotation."""
         return {
-            name: joint.wrist for name, joint in self.joints.items() if joint.wrist is not None and joint.wrist.limits
+            name: joint.wrist
+            for name, joint in self.joints.items()
+            if joint.wrist is not None and joint.wrist.is_limiting
         }
 
     @cached_property
@@ -451,7 +457,7 @@ class Mechanism(Result, shown_as="robot"):
             return self.scale or 1.0
         points = np.array([joint.point for joint in self.joints.values()])
         spread = float(np.mean(np.linalg.norm(points - points.mean(axis=0), axis=1)))
-        return spread if spread > NO_SPREAD * float(np.abs(points).max()) else 1.0
+        return spread if spread > CENTRE_SPREAD_MIN_FRACTION * float(np.abs(points).max()) else 1.0
 
     @cached_property
     def _joints_of(self) -> dict[str, tuple[Joint, ...]]:
@@ -490,9 +496,9 @@ class Mechanism(Result, shown_as="robot"):
 
     def fresh(self, name: str) -> str:
         """Return ``name``, or ``name_2``, ``name_3`` … if it is taken by a link or a joint."""
-        return fresh_name(name, self.links, self.joints)
+        return make_fresh_name(name, self.links, self.joints)
 
-    def differences(self, other: Mechanism, tolerance: float = SAME_GEOMETRY) -> list[str]:
+    def differences(self, other: Mechanism, tolerance: float = GEOMETRY_DIFFERENCE_TOL) -> list[str]:
         """Return the differences from ``other`` as texts; empty if they are the same mechanism (names, order,
         geometry)."""
         found: list[str] = []

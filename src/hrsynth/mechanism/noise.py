@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..budgets import WIDEST_NOISE
+from ..budgets import EDGE_NOISE_PIXELS_MAX
 from ..errors import BadRequest
 from ..geometry.vectors import Array
-from ..options import plain_number
-from ..tolerances import NOISE_STEP
+from ..options import parse_plain_number
+from ..tolerances import NOISE_DIFFERENCE_STEP_MAX
 from .cameras import CameraObservation
 from .observation import Observation
 
@@ -21,7 +21,7 @@ UNITS = {"px": ("px", 1.0), "deg": ("rad", math.radians(1)), "mm": ("m", 1e-3), 
 """Suffixes of amounts, the longer ones first: unit of the error, and factor to it."""
 IN_WORDS = {"px": ("pixels", "0.3px"), "rad": ("angles", "0.1deg"), "m": ("lengths", "1mm")}
 """Quantities of errors, and an example of each."""
-MOST = {"px": WIDEST_NOISE, "rad": math.pi / 2, "m": math.inf}
+MOST = {"px": EDGE_NOISE_PIXELS_MAX, "rad": math.pi / 2, "m": math.inf}
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Noise:
             ending = next(each for each in UNITS if word.endswith(each))
             unit, one = UNITS[ending]
             try:
-                value = plain_number(word.removesuffix(ending)) * one
+                value = parse_plain_number(word.removesuffix(ending)) * one
             except ValueError:
                 raise BadRequest("noise: not a number", text, EXAMPLE) from None
             if not 0 < value < MOST[unit] or unit in found:
@@ -57,7 +57,7 @@ class Noise:
                     "noise",
                     text,
                     "each unit once, more than 0; angles below 90deg (a number without unit is "
-                    f"in radians), below {WIDEST_NOISE:g}px",
+                    f"in radians), below {EDGE_NOISE_PIXELS_MAX:g}px",
                 )
             found[unit] = value
         return cls(tuple(found.items()))
@@ -97,12 +97,12 @@ class Noise:
         return amounts
 
 
-def vectors(seen: Observation) -> int:
+def count_vectors(seen: Observation) -> int:
     """Return the number of random vectors of an observation's noise."""
     return 1 if seen.size <= 3 else 2
 
 
-def blurs(seen: Observation, value: Array, amounts: Mapping[str, float]) -> list[Array]:
+def compute_noise_rates(seen: Observation, value: Array, amounts: Mapping[str, float]) -> list[Array]:
     """Return the rates (size, 3) of :meth:`.Observation.sense` by each random vector at zero, by central differences:
     to first order the errors are the sums of images of unit balls. ``value`` (size,) in metres."""
     own = {unit: amount for unit, amount in amounts.items() if unit in seen.found_by}
@@ -112,8 +112,8 @@ def blurs(seen: Observation, value: Array, amounts: Mapping[str, float]) -> list
         seen.pixels(own) if unit == "px" and isinstance(seen, CameraObservation) else amount
         for unit, amount in own.items()
     )
-    scale = NOISE_STEP / largest
+    scale = NOISE_DIFFERENCE_STEP_MAX / largest
     small = {unit: scale * amount for unit, amount in own.items()}
     ways = np.eye(6).reshape(6, 2, 3)
     columns = [(seen.sense(value, way, small) - seen.sense(value, -way, small)) / (2 * scale) for way in ways]
-    return list(np.stack(columns, axis=1).reshape(seen.size, 2, 3).transpose(1, 0, 2)[: vectors(seen)])
+    return list(np.stack(columns, axis=1).reshape(seen.size, 2, 3).transpose(1, 0, 2)[: count_vectors(seen)])

@@ -50,7 +50,7 @@ class Rods:
     word: Word
 
     def text(self, style: Style) -> str:
-        return _brace(f"{self.count}-{self.word.text(style)}", style)
+        return _wrap_in_braces(f"{self.count}-{self.word.text(style)}", style)
 
     def reversed(self) -> Rods:
         return Rods(self.count, self.word.reversed())
@@ -63,7 +63,7 @@ class Bar:
     branches: tuple[Word, ...]
 
     def text(self, style: Style) -> str:
-        return _brace("|".join(branch.text(style, spaced=True) for branch in self.branches), style)
+        return _wrap_in_braces("|".join(branch.text(style, spaced=True) for branch in self.branches), style)
 
     def reversed(self) -> Bar:
         return Bar(tuple(branch.reversed() for branch in self.branches))
@@ -77,7 +77,7 @@ class Carrier:
     sliders: Word
 
     def text(self, style: Style) -> str:
-        return _brace(f"{self.chain.text(style)}-{self.sliders.text(style)}", style)
+        return _wrap_in_braces(f"{self.chain.text(style)}-{self.sliders.text(style)}", style)
 
     def reversed(self) -> Carrier:
         return self
@@ -150,7 +150,7 @@ class Architecture:
         return self.unicode
 
 
-def _brace(text: str, style: Style) -> str:
+def _wrap_in_braces(text: str, style: Style) -> str:
     return rf"\{{{text}\}}" if style is Style.LATEX else f"{{{text}}}"
 
 

@@ -77,7 +77,7 @@ class Observation(Value):
         return (self.leg, self.link)
 
     @property
-    def by_segment(self) -> bool:
+    def is_segment_direction(self) -> bool:
         """It is a direction relative to the mechanism's reference link: the subject of the rules for segments."""
         return False
 
@@ -154,6 +154,6 @@ class Observation(Value):
         return [] if same else [f"observation of leg {self.leg}: {self!r} / {other!r}"]
 
 
-def labels_of(observations: Iterable[Observation]) -> tuple[str, ...]:
+def list_labels(observations: Iterable[Observation]) -> tuple[str, ...]:
     """Return the measured legs, each once, in order."""
     return tuple(dict.fromkeys(each.leg for each in observations))

@@ -8,7 +8,7 @@ from ..errors import BadRequest
 from .model import Mechanism, Note
 
 
-def between(mechanism: Mechanism, base: str, platform: str) -> Mechanism:
+def extract_between(mechanism: Mechanism, base: str, platform: str) -> Mechanism:
     """Return the links and joints on any path from ``base`` to ``platform`` that visits no link twice; the base is
     fixed.
 

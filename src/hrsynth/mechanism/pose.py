@@ -15,13 +15,13 @@ from typing import Annotated, Any, Protocol, TypedDict, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..budgets import FARTHEST_JOINT, FARTHEST_POSE, LARGEST_GRID
+from ..budgets import GRID_CELLS_MAX, JOINT_VALUE_MAX, POSE_VALUE_MAX
 from ..errors import BadRequest
-from ..geometry.vectors import Array, rotation_from_rpy
-from ..options import plain_number
+from ..geometry.vectors import Array, convert_rpy_to_rotation
+from ..options import parse_plain_number
 from ..records import FLAT, As, Record, recorded
 from ..results import Value
-from ..tolerances import AS_PRINTED, HALF_TURN
+from ..tolerances import HALF_TURN_TOL_RAD, PRINTED_POSE_TOL
 
 SCALARS = ("x", "y", "z", "phi")
 PARTS = (*SCALARS, "rpy")
@@ -47,15 +47,18 @@ class Pose(Record):
         for name, values in self.given.items():
             if not all(isinstance(value, int) or math.isfinite(value) for value in values):
                 raise BadRequest(f"pose: {name} is not finite", "/".join(map(str, values)), "a finite number")
-            if max(map(abs, values)) > FARTHEST_POSE:
-                raise BadRequest(f"pose: {name} is too large", "/".join(map(str, values)), f"at most {FARTHEST_POSE:g}")
+            if max(map(abs, values)) > POSE_VALUE_MAX:
+                raise BadRequest(
+                    f"pose: {name} is too large", "/".join(map(str, values)), f"at most {POSE_VALUE_MAX:g}"
+                )
 
     @classmethod
     def parse(cls, text: str) -> Pose:
         """Return the pose written as ``x=0.02,y=0.1,z=-0.7,phi=10deg``. Raises ``BadRequest``."""
-        parts = _fields(text, "pose")
+        parts = _split_fields(text, "pose")
         fields: dict[str, Any] = {
-            name: _triple(value, text) if name == "rpy" else _number(value, name, text) for name, value in parts
+            name: _parse_triple(value, text) if name == "rpy" else _parse_number(value, name, text)
+            for name, value in parts
         }
         return cls(**fields, shown=",".join(map("=".join, parts)))
 
@@ -66,7 +69,7 @@ class Pose(Record):
         x, y, z = map(float, X[:3, 3] if point is None else X[:3, :3] @ point + X[:3, 3])
         if point is not None:
             return cls(x, y, z)
-        roll, pitch, yaw = map(positive_half_turn, rpy_of(X[:3, :3]))
+        roll, pitch, yaw = map(normalise_half_turn, compute_rpy(X[:3, :3]))
         return cls(x, y, z, rpy=(roll, pitch, yaw))
 
     @property
@@ -85,7 +88,7 @@ class Pose(Record):
     @property
     def rotation(self) -> Array | None:
         """R_BP (3, 3) if rpy is given."""
-        return None if self.rpy is None else rotation_from_rpy(*self.rpy)
+        return None if self.rpy is None else convert_rpy_to_rotation(*self.rpy)
 
     def __str__(self) -> str:
         return self.shown or write_parts(self.given)
@@ -150,7 +153,7 @@ class JointPose:
             raise BadRequest(f"{kind} of a pose: all by name, or all in the order of the file", given, JOINT_POSES)
         if "" not in names and len(names) < len(pairs):
             raise BadRequest(f"{kind} of a pose: name given twice", given, "each name once")
-        read = [(name, *_coordinates(kind, value)) for name, value in pairs]
+        read = [(name, *_parse_coordinates(kind, value)) for name, value in pairs]
         return cls(
             kind == "motors",
             tuple((name, values) for name, values, _ in read),
@@ -167,7 +170,7 @@ class JointPose:
         return f"{self.kind}:{','.join(parts)}"
 
 
-def _coordinates(kind: str, given: Any) -> tuple[tuple[float, ...], bool]:
+def _parse_coordinates(kind: str, given: Any) -> tuple[tuple[float, ...], bool]:
     """Return the coordinates of one joint, and True if they are in degrees: numbers in metres or radians, or a text
     with / between, degrees with ``deg``."""
     try:
@@ -175,16 +178,16 @@ def _coordinates(kind: str, given: Any) -> tuple[tuple[float, ...], bool]:
             typed = [part.strip() for part in given.split("/")]
             digits = [part.removesuffix("deg") for part in typed]
             numbers = [
-                float(np.radians(plain_number(x))) if x != part else plain_number(x)
+                float(np.radians(parse_plain_number(x))) if x != part else parse_plain_number(x)
                 for part, x in zip(typed, digits, strict=True)
             ]
         else:
             typed, digits, numbers = [], [], np.atleast_1d(given).tolist()
-        if all(isinstance(x, int | float) and not isinstance(x, bool) and abs(x) < FARTHEST_JOINT for x in numbers):
+        if all(isinstance(x, int | float) and not isinstance(x, bool) and abs(x) < JOINT_VALUE_MAX for x in numbers):
             return tuple(map(float, numbers)), typed != digits
     except (TypeError, ValueError, OverflowError):
         pass
-    unit = f"metres or radians below {FARTHEST_JOINT:g}, or degrees with deg"
+    unit = f"metres or radians below {JOINT_VALUE_MAX:g}, or degrees with deg"
     raise BadRequest(f"{kind} of a pose: not a number of {unit}", given, JOINT_POSES)
 
 
@@ -208,7 +211,7 @@ POSES = (
 )
 
 
-def as_pose(given: PoseLike) -> Pose:
+def convert_to_pose(given: PoseLike) -> Pose:
     """Return the pose given in any form of ``PoseLike`` except by the number of a mode. Raises ``BadRequest``."""
     if isinstance(given, Pose):
         return given
@@ -217,7 +220,7 @@ def as_pose(given: PoseLike) -> Pose:
     try:
         if isinstance(given, Mapping):
             return Pose.parse(
-                ",".join(f"{name}={_as_text(value)}" for name, value in given.items() if value is not None)
+                ",".join(f"{name}={_format_value(value)}" for name, value in given.items() if value is not None)
             )
         if isinstance(given, bytes | bytearray):
             raise TypeError
@@ -227,9 +230,9 @@ def as_pose(given: PoseLike) -> Pose:
     if numbers.shape == (4, 4):
         R = numbers[:3, :3]
         if not (
-            np.max(np.abs(R @ R.T - np.eye(3))) < AS_PRINTED
+            np.max(np.abs(R @ R.T - np.eye(3))) < PRINTED_POSE_TOL
             and np.linalg.det(R) > 0
-            and np.max(np.abs(numbers[3] - np.eye(4)[3])) < AS_PRINTED
+            and np.max(np.abs(numbers[3] - np.eye(4)[3])) < PRINTED_POSE_TOL
         ):
             raise BadRequest("pose: not the matrix of a rotation and a translation", numbers.tolist(), POSES)
         return Pose.of(numbers)
@@ -239,14 +242,14 @@ def as_pose(given: PoseLike) -> Pose:
     return Pose(x, y, z, rpy=(rpy[0], rpy[1], rpy[2]) if rpy else None)
 
 
-def _as_text(value: Any) -> str:
+def _format_value(value: Any) -> str:
     """Return a part of a pose as a text, to the last digit."""
     if isinstance(value, str):
         return value
-    return repr(float(value)) if np.ndim(value) == 0 else "/".join(map(_as_text, value))
+    return repr(float(value)) if np.ndim(value) == 0 else "/".join(map(_format_value, value))
 
 
-def asked_poses(given: PoseLike | Iterable[PoseLike] | None) -> list[AskedPose]:
+def parse_poses(given: PoseLike | Iterable[PoseLike] | None) -> list[AskedPose]:
     """Return the given poses, one or several. Raises ``BadRequest``."""
     if given is None:
         return []
@@ -261,10 +264,10 @@ def asked_poses(given: PoseLike | Iterable[PoseLike] | None) -> list[AskedPose]:
             numbers = np.array(several)
             if numbers.dtype.kind in "iuf" and numbers.shape in ((3,), (6,), (4, 4)):
                 several = [numbers]
-    return [asked_pose(each) for each in several]
+    return [parse_pose(each) for each in several]
 
 
-def asked_pose(given: PoseLike) -> AskedPose:
+def parse_pose(given: PoseLike) -> AskedPose:
     """Return the given pose, by its parts, as ``mode:3`` or by coordinates of joints. Raises ``BadRequest``."""
     if isinstance(given, ModeNumber | JointPose):
         return given
@@ -273,7 +276,7 @@ def asked_pose(given: PoseLike) -> AskedPose:
             raise BadRequest(f"pose by {kinds[0]} and other parts", ", ".join(map(str, given)), "one of them")
         return JointPose.of(kinds[0], given[kinds[0]])
     if not isinstance(given, str):
-        return as_pose(given)
+        return convert_to_pose(given)
     name, colon, number = given.strip().partition(":")
     if colon and name in ("joints", "motors"):
         return JointPose.of(name, number)
@@ -313,7 +316,7 @@ class Grid(Value):
     fixed: Pose
 
     @classmethod
-    def parse(cls, text: Grid | str, largest: int = LARGEST_GRID) -> Grid:
+    def parse(cls, text: Grid | str, largest: int = GRID_CELLS_MAX) -> Grid:
         """Return the grid written as ``x=-0.3:0.3:21,y=0:0.1:5,z=-0.7`` (from:to:count), of at most ``largest`` poses,
         or a given grid. Raises ``BadRequest``."""
         if isinstance(text, Grid):
@@ -322,13 +325,13 @@ class Grid(Value):
             raise BadRequest("a grid", text, "a text such as x=-0.3:0.3:21,y=-0.3:0.3:21,z=-0.7")
         axes: list[tuple[str, Array]] = []
         single: list[str] = []
-        for name, value in _fields(text, "grid"):
+        for name, value in _split_fields(text, "grid"):
             if ":" not in value:
                 single.append(f"{name}={value}")
             elif name == "rpy":
                 raise BadRequest("grid: a range of rpy", value, "ranges of " + ", ".join(SCALARS))
             else:
-                axes.append((name, _range(value, name, text, largest)))
+                axes.append((name, _parse_range(value, name, text, largest)))
         if not 1 <= len(axes) <= 3:
             raise BadRequest("grid: number of ranges", text, "one to three, such as x=-0.3:0.3:21,y=-0.3:0.3:21,z=-0.7")
         cells = math.prod(len(values) for _, values in axes)
@@ -403,7 +406,7 @@ class Grid(Value):
         return replace(self.fixed, **given)
 
 
-def rpy_of(R: Array) -> tuple[float, float, float]:
+def compute_rpy(R: Array) -> tuple[float, float, float]:
     """Return fixed-axis roll, pitch, yaw of a rotation (3, 3); yaw is zero if the pitch is a right angle.
 
     The roll is read after the yaw is undone, so that the two agree near a right angle as well."""
@@ -413,9 +416,9 @@ def rpy_of(R: Array) -> tuple[float, float, float]:
     return math.atan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1]), pitch, yaw
 
 
-def positive_half_turn(angle: float) -> float:
+def normalise_half_turn(angle: float) -> float:
     """Return an angle; 180 degrees, which has no sense, is made positive."""
-    return -angle if abs(angle + math.pi) < HALF_TURN else angle
+    return -angle if abs(angle + math.pi) < HALF_TURN_TOL_RAD else angle
 
 
 def write_parts(parts: Mapping[str, tuple[float, ...]], degrees: bool = False) -> str:
@@ -433,7 +436,7 @@ def _write_number(value: float) -> str:
     return f"{round(value, 6) + 0.0:.15g}" if abs(value) >= 1 else f"{round(value, 9) + 0.0:.6g}"
 
 
-def _fields(text: str, what: str) -> list[tuple[str, str]]:
+def _split_fields(text: str, what: str) -> list[tuple[str, str]]:
     """Return name and value of each part, in order, each name once."""
     found: list[tuple[str, str]] = []
     for part in text.split(","):
@@ -448,10 +451,10 @@ def _fields(text: str, what: str) -> list[tuple[str, str]]:
     return found
 
 
-def _number(value: str, name: str, text: str) -> float:
+def _parse_number(value: str, name: str, text: str) -> float:
     digits = value.removesuffix("deg").strip() if name in ("phi", "rpy") else value
     try:
-        number: float = plain_number(digits)
+        number: float = parse_plain_number(digits)
     except ValueError:
         unit = "a number of radians, or of degrees with deg" if name in ("phi", "rpy") else "a number of metres"
         if ":" in value:
@@ -462,18 +465,18 @@ def _number(value: str, name: str, text: str) -> float:
     return number if digits == value else math.radians(number)
 
 
-def _triple(value: str, text: str) -> Sequence[float]:
+def _parse_triple(value: str, text: str) -> Sequence[float]:
     entries = value.split("/")
     if len(entries) != 3:
         raise BadRequest(f"pose {text!r}: rpy", value, "three angles, such as rpy=0.1/0/0 or rpy=10deg/0/0")
-    return tuple(_number(entry.strip(), "rpy", text) for entry in entries)
+    return tuple(_parse_number(entry.strip(), "rpy", text) for entry in entries)
 
 
-def _range(value: str, name: str, text: str, largest: int) -> Array:
+def _parse_range(value: str, name: str, text: str, largest: int) -> Array:
     entries = [entry.strip() for entry in value.split(":")]
     if len(entries) != 3 or not (value.isascii() and entries[2].isdecimal()) or not 2 <= int(entries[2]) <= largest:
         raise BadRequest(f"grid {text!r}: range of {name}", value, f"from:to:count with a count of 2 to {largest}")
-    low, high = (_number(entry, name, text) for entry in entries[:2])
+    low, high = (_parse_number(entry, name, text) for entry in entries[:2])
     if low == high:
         raise BadRequest(f"grid {text!r}: range of {name} has no extent", value, "two different ends")
     return np.linspace(low, high, int(entries[2]))

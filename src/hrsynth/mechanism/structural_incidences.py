@@ -59,7 +59,7 @@ class GeometricIncidence:
                 return f"observed direction of {self.links[0]}: along its centres or axes"
 
 
-def ties(relations: Incidences) -> tuple[GeometricIncidence, ...]:
+def list_incidences(relations: Incidences) -> tuple[GeometricIncidence, ...]:
     """Return all incidences, one by one."""
     found = [
         GeometricIncidence("same", (c,), links=(links[0], link))
@@ -78,13 +78,15 @@ def ties(relations: Incidences) -> tuple[GeometricIncidence, ...]:
     return tuple(found)
 
 
-def carried_by_joints(mechanism: Mechanism, relations: Incidences, every: Iterable[GeometricIncidence]) -> list[bool]:
+def find_structural_incidences(
+    mechanism: Mechanism, relations: Incidences, every: Iterable[GeometricIncidence]
+) -> list[bool]:
     """Return the structural ones among the incidences."""
-    known = _Carried(mechanism, relations)
-    return [known.holds(tie) for tie in every]
+    known = _FixedGeometry(mechanism, relations)
+    return [known.is_structural(tie) for tie in every]
 
 
-class _Carried:
+class _FixedGeometry:
     """Directions and centres with the links in which they are fixed, and the crosses of U joints."""
 
     def __init__(self, mechanism: Mechanism, relations: Incidences) -> None:
@@ -118,18 +120,20 @@ class _Carried:
             for c in range(number)
         ]
         self.slides = [self._joined_links(pairs) for pairs in slides]
-        self.levels = [self._joined_links([j.links for j in self.joints if self._level(j, c)]) for c in range(number)]
+        self.levels = [
+            self._joined_links([j.links for j in self.joints if self._is_level_joint(j, c)]) for c in range(number)
+        ]
         self.at = [{host} for host in relations.hosts]
         """Links in which each centre is fixed."""
         for joint in self.joints:
             if joint.name in relations.centres and joint.type is not JointType.CYLINDRICAL:
-                self.at[relations.centres[joint.name]] |= {*joint.links, _cross(joint)}
+                self.at[relations.centres[joint.name]] |= {*joint.links, _name_cross(joint)}
         self._spread(relations)
 
     @staticmethod
     def _joined_links(pairs: Iterable[tuple[str, str]]) -> dict[str, frozenset[str]]:
         """Return all links joined to each link."""
-        parts = (frozenset(part) for part in graphs.components(graphs.adjacency((), pairs)))
+        parts = (frozenset(part) for part in graphs.list_components(graphs.build_adjacency((), pairs)))
         return {link: part for part in parts for link in part}
 
     def _carriers(self, c: int) -> list[tuple[str, str]]:
@@ -140,7 +144,7 @@ class _Carried:
                 pairs.append(joint.links)
             elif joint.type is JointType.UNIVERSAL:
                 pairs += [
-                    (link, _cross(joint))
+                    (link, _name_cross(joint))
                     for link, axis in zip(joint.links, self.axes[joint.name], strict=True)
                     if axis == c
                 ]
@@ -150,7 +154,7 @@ class _Carried:
     def _reach(groups: dict[str, frozenset[str]], links: set[str]) -> set[str]:
         return links.union(*(groups.get(link, ()) for link in links))
 
-    def _level(self, joint: Joint, c: int) -> bool:
+    def _is_level_joint(self, joint: Joint, c: int) -> bool:
         """Return True if a joint keeps heights along class c."""
         if joint.type is JointType.PRISMATIC:
             return self._is_square(c, *self.axes[joint.name])
@@ -183,7 +187,7 @@ class _Carried:
                 if not self.at[number].isdisjoint(links):
                     self.at[number] |= set(links)
 
-    def holds(self, tie: GeometricIncidence) -> bool:
+    def is_structural(self, tie: GeometricIncidence) -> bool:
         """Return True if an incidence is structural."""
         if tie.kind == "same":
             first, other = tie.links
@@ -224,6 +228,6 @@ class _Carried:
         )
 
 
-def _cross(joint: Joint) -> str:
+def _name_cross(joint: Joint) -> str:
     """Return the name of a U joint's cross among those of links: no link has it."""
     return f"\0{joint.name}"

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..geometry.vectors import Array, angle_between
+from ..geometry.vectors import Array, measure_angle
 from ..results import Value
-from ..tolerances import SAME_DIRECTION
+from ..tolerances import DIRECTION_SINE_TOL
 
 Interval = tuple[float, float]
 
@@ -36,22 +36,22 @@ class TiltLimit(Value):
     def of(cls, first: Array, last: Array, interval: Interval, count: int) -> TiltLimit | None:
         """Return the tilt limit; None if every rotation can be made, with three dof at all of them."""
         wrist = cls(first, last, *interval, count)
-        return wrist if wrist.limits or count == 3 else None
+        return wrist if wrist.is_limiting or count == 3 else None
 
     @property
-    def limits(self) -> bool:
+    def is_limiting(self) -> bool:
         """There are rotations that cannot be made."""
         return self.lower is not None or self.upper is not None
 
     @property
     def lower(self) -> float | None:
         """Lower end (rad), if it limits anything."""
-        return self.low if self.low > SAME_DIRECTION else None
+        return self.low if self.low > DIRECTION_SINE_TOL else None
 
     @property
     def upper(self) -> float | None:
         """Upper end (rad), if it limits anything."""
-        return self.high if self.high < np.pi - SAME_DIRECTION else None
+        return self.high if self.high < np.pi - DIRECTION_SINE_TOL else None
 
     def turned(self) -> TiltLimit:
         """Return the tilt limit with predecessor and successor exchanged."""
@@ -63,24 +63,24 @@ class TiltLimit(Value):
 
     def margin(self) -> float:
         """Return the distance of the angle from the nearer end (rad); negative outside."""
-        angle = angle_between(self.first, self.last)
+        angle = measure_angle(self.first, self.last)
         return min(
             np.inf if self.lower is None else angle - self.lower, np.inf if self.upper is None else self.upper - angle
         )
 
     def flatness(self) -> float:
         """Return the distance of the angle from the nearer end at which the axes lie in a plane (rad)."""
-        angle = angle_between(self.first, self.last)
+        angle = measure_angle(self.first, self.last)
         ends = (self.low, self.high) if self.count == 3 else (self.lower, self.upper)
         return min((abs(angle - end) for end in ends if end is not None), default=np.inf)
 
 
-def chain_arcs(one: Interval, gap: float, other: Interval) -> Interval:
+def bound_arc_chain(one: Interval, gap: float, other: Interval) -> Interval:
     """Return the distances of the ends of three arcs on the unit sphere, end to end: one of a length in ``one``,
     ``gap``, one of a length in ``other``; two sides leave |a − b| ≤ c ≤ π − |π − a − b| to the third."""
-    return _third(_third(one, (gap, gap)), other)
+    return _bound_third_side(_bound_third_side(one, (gap, gap)), other)
 
 
-def _third(a: Interval, b: Interval) -> Interval:
+def _bound_third_side(a: Interval, b: Interval) -> Interval:
     low = max(a[0] - b[1], b[0] - a[1], 0.0)
     return low, np.pi - max(np.pi - a[1] - b[1], a[0] + b[0] - np.pi, 0.0)

@@ -12,62 +12,62 @@ import numpy as np
 
 from ..analysis.observed import ObservedRobot
 from ..errors import BadRequest
-from ..geometry.vectors import Array, inverse
+from ..geometry.vectors import Array, invert_pose
 from ..progress import report
 from ..simulation.camera import Camera, Cylinder, cylinders, facing, rods_in_frame
 from ..simulation.crossings import TYPE_2
 from ..simulation.mujoco_model import rods as rods_of
-from ..simulation.rendered_images import GREY, LegRenderer
+from ..simulation.rendered_images import LINK_GREY_FRACTION, LegRenderer
 from ..simulation.result import Servo
-from ..tolerances import REST_OF_RUN
+from ..tolerances import DRAWN_ERROR_MIN_FRACTION
 from . import palette
-from .plots import empty_figure, in_style, pose_words
-from .runs import ENDS, LEAST_TURN, until
+from .plots import describe_pose, in_style, make_empty_figure
+from .runs import DRAWN_ROTATION_DEGREES_MIN, ENDS, find_end_time
 from .text.tables import name_all
 
 FRAMES, PAUSE = 50, 12
 """Frames of the run, and repetitions of the last one."""
-MILLISECONDS = 80
+FRAME_MILLISECONDS_COUNT = 80
 """Duration of a frame."""
 WIDTH, HEIGHT, SIDE, DOTS = 1280, 720, 440, 100
 """Pixels of the animation, of the captions beside the camera image, and an inch."""
-FOCAL = 1.25
+ANIMATION_FOCAL_WIDTH_FRACTION = 1.25
 """Focal length of the camera over the width of its image."""
-ELEVATION = 0.3
+CAMERA_ELEVATION_RAD = 0.3
 """Downward angle of the camera (rad)."""
-WANTED = 0.45
+DESIRED_IMAGE_BRIGHTNESS_FRACTION = 0.45
 """Brightness of the image at the goal below the present one."""
-AFTER = 3
+CROSSING_CAPTION_FRAMES_COUNT = 3
 """Frames during which a crossing is captioned."""
-SHADES = 32
+GIF_COLOURS_COUNT = 32
 """Colours of the file."""
-WATCHED = np.array([int(palette.colour("observed")[i : i + 2], 16) / 255 for i in (1, 3, 5)])
-LINE = 38
+WATCHED = np.array([int(palette.get_colour("observed")[i : i + 2], 16) / 255 for i in (1, 3, 5)])
+CAPTION_LINE_CHARACTERS_MAX = 38
 """Letters of a line of words."""
 
 
 @in_style
-def animation(found: Servo) -> bytes:
-    """Draw the run as GIF, at equal parts of its path; raise ``MissingExtra``, ``NotRendered``."""
+def draw_animation(found: Servo) -> bytes:
+    """Draw the run as GIF, at equal parts of its path; raise ``MissingExtra``, ``RenderFailure``."""
     from PIL import Image
 
     setup, configurations = found.setup, found.run.configurations
     require_legs(setup)
     question = setup.samples.observation_model
     stage = LegRenderer(
-        setup.mechanism, _camera(found), question.reference, cylinders(setup.mechanism, question.observations)
+        setup.mechanism, _place_camera(found), question.reference, cylinders(setup.mechanism, question.observations)
     )
-    wanted = _lit(stage.picture(found.target.pose))
-    paper = np.where(_bare(wanted)[..., None], 1.0, 1.0 - WANTED * (1.0 - wanted))
+    wanted = _convert_to_light(stage.picture(found.target.pose))
+    paper = np.where(_find_background(wanted)[..., None], 1.0, 1.0 - DESIRED_IMAGE_BRIGHTNESS_FRACTION * (1.0 - wanted))
     sheet = Sheet(found)
     frames = []
-    moments = _moments(np.array([at.pose(setup.motion.link)[:3, 3] for at in configurations]), found.errors)
-    for number, words in zip(moments, captions(found, moments), strict=True):
+    moments = _choose_moments(np.array([at.pose(setup.motion.link)[:3, 3] for at in configurations]), found.errors)
+    for number, words in zip(moments, list_captions(found, moments), strict=True):
         report("frames")
-        seen = _lit(stage.picture(configurations[number].pose))
+        seen = _convert_to_light(stage.picture(configurations[number].pose))
         frame = sheet.at(number, words)
-        frame[:, : seen.shape[1]] = frame[:, : seen.shape[1]] * np.where(_bare(seen)[..., None], paper, seen)
-        frames.append(Image.fromarray(frame).quantize(SHADES, dither=Image.Dither.NONE))
+        frame[:, : seen.shape[1]] = frame[:, : seen.shape[1]] * np.where(_find_background(seen)[..., None], paper, seen)
+        frames.append(Image.fromarray(frame).quantize(GIF_COLOURS_COUNT, dither=Image.Dither.NONE))
     stream = io.BytesIO()
     frames[0].save(
         stream,
@@ -75,7 +75,7 @@ def animation(found: Servo) -> bytes:
         save_all=True,
         append_images=[*frames[1:], *[frames[-1]] * PAUSE],
         loop=0,
-        duration=MILLISECONDS,
+        duration=FRAME_MILLISECONDS_COUNT,
         optimize=True,
     )
     return stream.getvalue()
@@ -84,7 +84,7 @@ def animation(found: Servo) -> bytes:
 def require_legs(setup: ObservedRobot, **_: Any) -> None:
     """Raise ``BadRequest`` if others than legs are observed."""
     for each in setup.observed:
-        if not each.by_segment:
+        if not each.is_segment_direction:
             raise BadRequest(
                 f"{setup.robot.name}: an animation shows observed legs only",
                 f"{each.kind} {each.leg}",
@@ -92,18 +92,18 @@ def require_legs(setup: ObservedRobot, **_: Any) -> None:
             )
 
 
-def captions(found: Servo, moments: list[int]) -> Iterator[str]:
+def list_captions(found: Servo, moments: list[int]) -> Iterator[str]:
     """Yield a caption for each of the moments (numbers of configurations, the last one the end)."""
     sizes = found.errors.max(axis=1)
     metres, radians = found.from_goal
     passages = found.track.passages or ()
     for k, number in enumerate(moments):
-        since = moments[max(0, k - AFTER)]
+        since = moments[max(0, k - CROSSING_CAPTION_FRAMES_COUNT)]
         passed = [each for each in passages if since < each.place <= number]
         if k == 0:
             yield "Start. Pale: observed legs at the goal. Bright: observed legs now."
         elif k == len(moments) - 1:
-            turned = f" and {np.degrees(radians):.2g}°" if np.degrees(radians) > LEAST_TURN else ""
+            turned = f" and {np.degrees(radians):.2g}°" if np.degrees(radians) > DRAWN_ROTATION_DEGREES_MIN else ""
             yield f"End: {ENDS[found.outcome]}. The platform is {1e3 * metres:.3g} mm{turned} from the goal."
         elif passed:
             yield (
@@ -111,7 +111,7 @@ def captions(found: Servo, moments: list[int]) -> Iterator[str]:
                 if passed[-1].kind == TYPE_2
                 else "A leg passes a Type 1 singularity."
             )
-        elif sizes[number] > REST_OF_RUN * sizes.max():
+        elif sizes[number] > DRAWN_ERROR_MIN_FRACTION * sizes.max():
             yield "The controller rotates the observed legs towards the goal directions."
         else:
             yield "The observed legs have the goal directions; the platform stops."
@@ -122,15 +122,15 @@ class Sheet:
 
     def __init__(self, found: Servo) -> None:
         self.times = found.run.times
-        figure = self.figure = empty_figure(WIDTH / DOTS, HEIGHT / DOTS, dpi=DOTS)
+        figure = self.figure = make_empty_figure(WIDTH / DOTS, HEIGHT / DOTS, dpi=DOTS)
         left, wide = (WIDTH - SIDE + 30) / WIDTH, (SIDE - 60) / WIDTH
         figure.text(left, 0.945, found.setup.robot.name, fontsize=17, fontweight="bold", va="center")
         figure.text(
-            left, 0.895, f"start {pose_words(found.start)}\ngoal {pose_words(found.goal)}", fontsize=9, va="top"
+            left, 0.895, f"start {describe_pose(found.start)}\ngoal {describe_pose(found.goal)}", fontsize=9, va="top"
         )
         figure.text(0.015, 0.965, "camera image", fontsize=12, va="center")
         self.words = figure.text(left, 0.79, "", fontsize=14, va="top", linespacing=1.35)
-        figure.text(left, 0.53, "■", fontsize=11, va="center", color=palette.colour("observed"))
+        figure.text(left, 0.53, "■", fontsize=11, va="center", color=palette.get_colour("observed"))
         figure.text(
             left + 0.016, 0.53, f"observed {name_all('leg', found.setup.labels)}; pale: goal", fontsize=10, va="center"
         )
@@ -141,36 +141,36 @@ class Sheet:
         ):
             place = figure.add_axes((left + 0.025, bottom, wide - 0.025, 0.135))
             place.plot(self.times, values, color="0.35")
-            place.set(xlim=(0, until(found) or 1.0), ylim=(0, None))
+            place.set(xlim=(0, find_end_time(found) or 1.0), ylim=(0, None))
             place.set_title(label, loc="left", fontsize=10)
             self.marks.append((place.plot([], [], "o", color="black")[0], values))
         place.set_xlabel("time (s)")
 
     def at(self, number: int, words: str) -> Array:
         """Draw a frame (height, width, 3), bytes, without the camera image."""
-        self.words.set_text(textwrap.fill(words, LINE))
+        self.words.set_text(textwrap.fill(words, CAPTION_LINE_CHARACTERS_MAX))
         for mark, values in self.marks:
             mark.set_data([self.times[number]], [values[number]])
         self.figure.canvas.draw()
         return np.array(self.figure.canvas.buffer_rgba())[..., :3]
 
 
-def _camera(found: Servo) -> Camera:
+def _place_camera(found: Servo) -> Camera:
     """Place a camera with the whole robot in its image at both ends of the run, from above."""
     mechanism, reference = found.setup.mechanism, found.setup.samples.observation_model.reference
     links = []
     for link in set(mechanism.links) - {mechanism.base}:
-        X = inverse(mechanism.links[link].pose)
+        X = invert_pose(mechanism.links[link].pose)
         links += [Cylinder(link, np.array(ends) @ X[:3, :3].T + X[:3, 3], 0.0) for ends in rods_of(mechanism, link)]
     configurations = (*found.run.configurations[:: max(1, len(found.run.configurations) // 5)], found.target)
     points = np.array([rods_in_frame(links, reference, at.pose) for at in configurations])
-    ahead = np.array([np.cos(ELEVATION), 0.0, -np.sin(ELEVATION)])
+    ahead = np.array([np.cos(CAMERA_ELEVATION_RAD), 0.0, -np.sin(CAMERA_ELEVATION_RAD)])
     wide = WIDTH - SIDE
-    blank = Camera(np.eye(4), FOCAL * wide, wide, HEIGHT)
+    blank = Camera(np.eye(4), ANIMATION_FOCAL_WIDTH_FRACTION * wide, wide, HEIGHT)
     return facing(points, ahead, np.array([0.0, -1.0, 0.0]), blank)
 
 
-def _moments(places: Array, errors: Array) -> list[int]:
+def _choose_moments(places: Array, errors: Array) -> list[int]:
     """Return numbers of configurations that divide the run equally by motion of platform and legs."""
     ways = [
         np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(values, axis=0), axis=1))])
@@ -180,19 +180,19 @@ def _moments(places: Array, errors: Array) -> list[int]:
     return [int(i) for i in np.searchsorted(way, np.linspace(0.0, way[-1], FRAMES)).clip(0, len(places) - 1)]
 
 
-def _lit(picture: Array) -> Array:
+def _convert_to_light(picture: Array) -> Array:
     """Convert a rendered image, 0 to 255, to colours from 0 to 1: observed legs in theirs, dark grey lighter."""
     bright = picture / 255.0
-    high, low = _brightest(bright), -_brightest(-bright)
-    grey = (high - low < 0.05) & (high > 0.5 * GREY)
+    high, low = _find_brightest(bright), -_find_brightest(-bright)
+    grey = (high - low < 0.05) & (high > 0.5 * LINK_GREY_FRACTION)
     return np.where(grey[..., None], 0.6, high[..., None] * WATCHED)
 
 
-def _bare(colours: Array) -> Array:
+def _find_background(colours: Array) -> Array:
     """Return the mask of empty pixels."""
-    return np.asarray(_brightest(colours) < 0.5 * GREY)
+    return np.asarray(_find_brightest(colours) < 0.5 * LINK_GREY_FRACTION)
 
 
-def _brightest(colours: Array) -> Array:
+def _find_brightest(colours: Array) -> Array:
     """Return the largest of the three channels, faster than a reduction over a short axis."""
     return np.maximum(np.maximum(colours[..., 0], colours[..., 1]), colours[..., 2])

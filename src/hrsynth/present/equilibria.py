@@ -9,20 +9,20 @@ import numpy as np
 from ..kinematics.configuration import ClosedConfiguration
 from ..simulation.equilibria.equilibrium import CRITICAL, STABLE, Equilibria, Equilibrium
 from . import palette
-from .figure_format import PNG, Paper, legend_within, print_figure, settle_title
+from .figure_format import PNG, Paper, draw_legend_within, print_figure, wrap_title
 from .palette import SERIES
-from .plots import empty_figure, entry, in_style, pose_words
-from .skeleton import legs_of, outline
+from .plots import describe_pose, in_style, make_empty_figure, make_legend_entry
+from .skeleton import trace_leg_outlines, trace_link_outline
 from .sketch import Sketch
-from .view.view import plane_normal
+from .view.view import find_plane_normal
 
 WIDE, TALL, EDGE, SCALES = 7.2, 6.4, 0.2, 0.8
 """Width and height of the figure, its margin, and the room for the scales (inches)."""
-WITHIN = 1.6
+DRAWN_EQUILIBRIUM_RANGE_FRACTION = 1.6
 """Distance from the middle of the robot up to which equilibria are drawn, over the extent of the robot."""
 LOOKS: dict[str, dict[str, Any]] = {
-    "goal": {"color": palette.colour("goal"), "marker": "*", "markersize": 13},
-    "assembly mode": {"color": palette.colour("mode"), "marker": "D", "markersize": 8},
+    "goal": {"color": palette.get_colour("goal"), "marker": "*", "markersize": 13},
+    "assembly mode": {"color": palette.get_colour("mode"), "marker": "D", "markersize": 8},
     "antipodal": {"color": SERIES[3], "marker": "s", "markersize": 8},
     "critical": {"color": SERIES[1], "marker": "o", "markersize": 8},
     "other": {"color": "0.6", "marker": "x", "markersize": 5},
@@ -38,45 +38,54 @@ WORDS = {
 
 
 @in_style
-def picture(found: Equilibria, paper: Paper = PNG) -> bytes:
+def draw_equilibria(found: Equilibria, paper: Paper = PNG) -> bytes:
     """Draw the equilibria as a figure on ``paper``."""
     goal, platform = found.goal, found.setup.decomposition.platform
     mechanism, motion = goal.model.mechanism, found.setup.motion
     ground = np.array([joint.point for joint in mechanism.joints_of(mechanism.base)])
-    robot = [*legs_of(goal, platform), *_outlines(goal, platform), *_sights(found, goal)]
+    robot = [
+        *trace_leg_outlines(goal, platform),
+        *_list_outlines(goal, platform),
+        *_list_observation_lines(found, goal),
+    ]
     extent = np.vstack([ground, *robot])
     middle, size = (extent.min(axis=0) + extent.max(axis=0)) / 2, float(np.ptp(extent, axis=0).max())
     drawn = [(each, motion.position(each.configuration.pose(motion.link))) for each in found.points]
-    near = [(each, p) for each, p in drawn if np.abs(p - middle).max() <= WITHIN * size]
+    near = [(each, p) for each, p in drawn if np.abs(p - middle).max() <= DRAWN_EQUILIBRIUM_RANGE_FRACTION * size]
     shapes = [
-        (look(each), [*_outlines(each.configuration, platform), *_sights(found, each.configuration)])
+        (
+            look(each),
+            [*_list_outlines(each.configuration, platform), *_list_observation_lines(found, each.configuration)],
+        )
         for each, _ in near
         if each.stability == STABLE
     ]
     every = np.vstack([extent, *(p for _, p in near), *(stroke for _, some in shapes for stroke in some)])
-    figure = empty_figure(paper.wide(WIDE), TALL)
+    figure = make_empty_figure(paper.wide(WIDE), TALL)
     far = len(drawn) - len(near)
     beyond = f"; {far} farther away not drawn" if far else ""
-    word = "legs " if all(each.by_segment for each in found.setup.observed) else ""
+    word = "legs " if all(each.is_segment_direction for each in found.setup.observed) else ""
     title = figure.suptitle(
         f"{found.setup.robot.name}, {word}{', '.join(found.setup.labels)} observed, goal "
-        f"{pose_words(found.pose)}\n{len(found.stable)} of {len(found.points)} equilibria stable"
+        f"{describe_pose(found.pose)}\n{len(found.stable)} of {len(found.points)} equilibria stable"
         f"{beyond}",
         va="top",
     )
-    above = settle_title(figure, title)
+    above = wrap_title(figure, title)
     kinds = [kind for kind in WORDS if any(look(each) == kind for each, _ in near)]
     entries = [
-        entry("robot at the goal", color="0.72"),
-        entry("joints of the base", linestyle="", **BASE),
-        *(entry(WORDS[k], linestyle="", **LOOKS[k]) for k in kinds),
+        make_legend_entry("robot at the goal", color="0.72"),
+        make_legend_entry("joints of the base", linestyle="", **BASE),
+        *(make_legend_entry(WORDS[k], linestyle="", **LOOKS[k]) for k in kinds),
     ]
     if shapes:
-        entries.append(entry("platform at stable equilibria (in their colour)", color="black", linewidth=1.6))
-    low = legend_within(figure, entries, figure.get_figwidth(), loc="lower center")
+        entries.append(
+            make_legend_entry("platform at stable equilibria (in their colour)", color="black", linewidth=1.6)
+        )
+    low = draw_legend_within(figure, entries, figure.get_figwidth(), loc="lower center")
     wide, tall = figure.get_figwidth(), figure.get_figheight()
     box = (SCALES / wide, (low + SCALES) / tall, 1 - (SCALES + EDGE) / wide, 1 - (low + SCALES + above + EDGE) / tall)
-    sketch = Sketch.of(plane_normal(motion), ground, [])
+    sketch = Sketch.of(find_plane_normal(motion), ground, [])
     place = sketch.place(figure, box, every)
     for stroke in robot:
         sketch.stroke(place, stroke, color="0.72", linewidth=1.2)
@@ -95,16 +104,16 @@ def look(each: Equilibrium) -> str:
     return each.kind if each.kind != CRITICAL or each.stability == STABLE else "other"
 
 
-def _outlines(at: ClosedConfiguration, platform: Any) -> list[Any]:
-    return [outline(at.model.mechanism, link, at.pose(link)) for link in platform]
+def _list_outlines(at: ClosedConfiguration, platform: Any) -> list[Any]:
+    return [trace_link_outline(at.model.mechanism, link, at.pose(link)) for link in platform]
 
 
-def _sights(found: Equilibria, at: ClosedConfiguration) -> list[Any]:
+def _list_observation_lines(found: Equilibria, at: ClosedConfiguration) -> list[Any]:
     """Return the observations other than segments, as lines in space."""
     reference, size = found.setup.mechanism.reference, at.model.length / 2
     return [
         line
         for each in found.setup.observed
-        if not each.by_segment
+        if not each.is_segment_direction
         for line in each.draw(at.pose(each.seen_from or reference), at.pose(each.link), size).lines
     ]

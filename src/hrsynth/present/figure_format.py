@@ -20,7 +20,7 @@ USUAL, PRINTED = 10.0, 8.0
 """Text size (points) of the layout, and smallest text size of a figure unless another is requested."""
 BESIDE, AXES, LEAST = 2.3, 5.0, 3.2
 """Room for a legend beside the axes, what must be left to them, and the narrowest layout (inches with usual text)."""
-BORDER = 0.15
+TITLE_BORDER_INCHES_MIN = 0.15
 """Left free on both sides of a title (inches)."""
 MILLIMETRES = {"mm": 1.0, "cm": 10.0, "in": 25.4}
 WIDTHS, TEXTS = (1.0, 40.0), (4.0, 40.0)
@@ -62,13 +62,13 @@ class Paper:
         """Break lines that are too long for their place, and scale a figure with its texts and strokes."""
         if self.room != inf and self.size is not None:
             figure.set_figwidth(self.room)
-        settle(figure)
+        wrap_labels(figure)
         scale = (self.size or USUAL) / USUAL if self.width is None else self.width / figure.get_figwidth()
         every: list[Any] = list({id(each): each for each in figure.findobj()}.values())
         for each in every:
             if self.font is not None and hasattr(each, "set_fontfamily"):
                 each.set_fontfamily(self.font)
-        for axis in axes_of(figure):
+        for axis in list_axes(figure):
             if self.font is not None:
                 axis.set_tick_params(labelfontfamily=self.font)
         if scale != 1.0:
@@ -78,7 +78,7 @@ class Paper:
 PNG = Paper()
 
 
-def paper_for(ending: str, width: str | None, font: str | None) -> Paper:
+def choose_paper(ending: str, width: str | None, font: str | None) -> Paper:
     """Return the format of a figure: ``width`` as 88mm, 8.8cm or 3.5in, ``font`` as a name, a size (8pt) or both
     (Times 8pt). Raise ``BadRequest``."""
     inches = size = None
@@ -133,13 +133,13 @@ def print_figure(figure: Any, paper: Paper) -> bytes:
     return stream.getvalue()
 
 
-def settle(figure: Any) -> None:
+def wrap_labels(figure: Any) -> None:
     """Break titles and names of axes that are longer than their place; where axes are placed by themselves, let them
     find it."""
     if figure.get_layout_engine() is None:
         return
     if figure.get_suptitle():
-        settle_title(figure, figure._suptitle)
+        wrap_title(figure, figure._suptitle)
     figure.draw_without_rendering()
     for place in figure.axes:
         box = place.get_window_extent()
@@ -148,9 +148,9 @@ def settle(figure: Any) -> None:
     figure.draw_without_rendering()
 
 
-def settle_title(figure: Any, title: Any) -> float:
+def wrap_title(figure: Any, title: Any) -> float:
     """Break a title where it is wider than its figure; its height (inches)."""
-    wrap(title, figure.get_figwidth() - 2 * BORDER)
+    wrap(title, figure.get_figwidth() - 2 * TITLE_BORDER_INCHES_MIN)
     return float(title.get_window_extent().height / figure.dpi)
 
 
@@ -189,7 +189,7 @@ def fill_lines(words: list[str], length: Callable[[str], float], width: float) -
     return lines
 
 
-def legend_within(figure: Any, entries: list[Any], width: float, **where: Any) -> float:
+def draw_legend_within(figure: Any, entries: list[Any], width: float, **where: Any) -> float:
     """A legend of a figure in as many columns as ``width`` inches allow; its height (inches)."""
     for columns in range(len(entries), 0, -1):
         made = figure.legend(handles=entries, ncols=columns, **where)
@@ -200,7 +200,7 @@ def legend_within(figure: Any, entries: list[Any], width: float, **where: Any) -
     return 0.0
 
 
-def axes_of(figure: Any) -> list[Any]:
+def list_axes(figure: Any) -> list[Any]:
     """All axes with ticks."""
     return [axis for place in figure.axes for axis in place._axis_map.values()]
 
@@ -211,7 +211,7 @@ def scale_figure(figure: Any, every: list[Any], scale: float) -> None:
         for name, power in (("fontsize", 1), ("linewidth", 1), ("markersize", 1), ("sizes", 2)):
             if hasattr(each, f"set_{name}"):
                 getattr(each, f"set_{name}")(np.multiply(scale**power, getattr(each, f"get_{name}")()))
-    for axis in axes_of(figure):
+    for axis in list_axes(figure):
         given = axis.get_tick_params()
         for label in axis.get_ticklabels()[:1]:
             axis.set_tick_params(labelsize=label.get_fontsize())

@@ -15,23 +15,23 @@ from ..analysis.singularity.locus import Locus
 from ..errors import BadRequest
 from ..geometry.vectors import Array
 from ..mechanism.pose import PARTS
-from ..tolerances import DARKEST_DISTANCE, DISTANCE_FLOOR
+from ..tolerances import DARKEST_SINGULAR_VALUE_MAX, MAP_DISTANCE_FLOOR_FRACTION
 from . import palette, plots
 from .figure_format import PNG, Paper, print_figure
 from .plots import (
     MapPlane,
-    along,
-    entry,
-    heading,
+    convert_to_ticks,
+    draw_heading,
+    format_ticks,
     in_style,
-    missing_entry,
-    panels,
+    label_curve,
+    make_legend_entry,
+    make_missing_entry,
+    make_panels,
     round_ticks,
-    tick_values,
-    tick_words,
 )
 from .pose_map import PoseMap
-from .text.tables import csv_bytes
+from .text.tables import encode_csv
 
 if TYPE_CHECKING:
     from ..analysis.accuracy.accuracy import Accuracy
@@ -52,19 +52,22 @@ MARKS = {
 }
 """Markers of singular poses by state."""
 VALUE = "smallest singular value of Mᵀ"
-LOCI = {"hidden robot": (palette.colour("actuator"), "solid", "o"), "real robot": (palette.PAGE["ink"], "dashed", "s")}
-NEAR_TYPE_1 = 0.5
+LOCI = {
+    "hidden robot": (palette.get_colour("actuator"), "solid", "o"),
+    "real robot": (palette.PAGE["ink"], "dashed", "s"),
+}
+TYPE_1_BOUNDARY_FRACTION = 0.5
 """Fraction of its median below which the Type 1 distance marks a boundary of that kind."""
 ERRORS = "cividis"
 """Colour scale with the same order for any colour vision."""
 STROKES = (("black", 3.4), ("white", 1.6))
 """Colours and widths of a line that is visible on any colour, drawn over each other."""
-HIGHEST = 30.0
+ERROR_SCALE_END_FRACTION = 30.0
 """End of the scale, as a multiple of the median error."""
 
 
 @in_style
-def distance_map(found: Check, paper: Paper = PNG) -> bytes:
+def draw_distance_map(found: Check, paper: Paper = PNG) -> bytes:
     """Draw the Type 2 distance over a grid: a curve for a line of poses, a colour map for a plane, several for a box.
 
     Raise ``BadRequest`` if Mᵀ exists nowhere."""
@@ -78,19 +81,19 @@ def distance_map(found: Check, paper: Paper = PNG) -> bytes:
     numbers = np.array([np.nan if value is None else value for value in grid.values("type2")]).reshape(grid.grid.shape)
     states = np.array(grid.states).reshape(grid.grid.shape)
     figure = (
-        _distance_curve(grid, numbers, states, paper)
+        _draw_distance_curve(grid, numbers, states, paper)
         if grid.grid.ndim == 1
-        else _distance_maps(grid, numbers, states, found.setup.motion, paper)
+        else _draw_distance_maps(grid, numbers, states, found.setup.motion, paper)
     )
-    entries = [missing_entry()] if UNREACHABLE in grid.states else []
-    entries += _robot(figure, grid.grid, found.setup)
+    entries = [make_missing_entry()] if UNREACHABLE in grid.states else []
+    entries += _draw_robot(figure, grid.grid, found.setup)
     entries += [
-        entry(label, linestyle="", marker=mark, color=palette.colour("step4"), markeredgecolor="white")
+        make_legend_entry(label, linestyle="", marker=mark, color=palette.get_colour("step4"), markeredgecolor="white")
         for state, (mark, label) in MARKS.items()
         if state in grid.states
     ]
-    plots.legend(figure, entries, paper)
-    heading(
+    plots.draw_legend(figure, entries, paper)
+    draw_heading(
         figure,
         f"{found.setup.robot.name}: Type 2 distance, legs {', '.join(found.setup.labels)} observed",
         grid.grid.fixed,
@@ -98,14 +101,14 @@ def distance_map(found: Check, paper: Paper = PNG) -> bytes:
     return print_figure(figure, paper)
 
 
-def _robot(figure: Any, grid: Grid, setup: ObservedRobot) -> list[Any]:
+def _draw_robot(figure: Any, grid: Grid, setup: ObservedRobot) -> list[Any]:
     """Draw the robot in the maps of a grid; return its entry in the legend."""
     return (
         [] if grid.ndim == 1 else MapPlane.of(grid.axes, setup.motion, 0.3, 2.0).robot(figure, setup.all_samples.start)
     )
 
 
-def _distance_maps(
+def _draw_distance_maps(
     grid: GridCheck, numbers: Array, states: NDArray[np.str_], motion: PlatformMotion, paper: Paper
 ) -> Any:
     from matplotlib.colors import LogNorm
@@ -114,12 +117,12 @@ def _distance_maps(
     low, high, _ = _scale(numbers)
     norm = LogNorm(low, high)
     for (place, distances), (_, state) in zip(made.layers(numbers), made.layers(states), strict=True):
-        _distances(place, made.plane, np.maximum(distances, low), state, norm)
+        _draw_distances(place, made.plane, np.maximum(distances, low), state, norm)
     made.scale(norm, "viridis", VALUE, "min" if np.nanmin(numbers) < low else "neither")
     return made.figure
 
 
-def _distances(place: Any, plane: MapPlane, numbers: Array, states: NDArray[np.str_], norm: Any) -> None:
+def _draw_distances(place: Any, plane: MapPlane, numbers: Array, states: NDArray[np.str_], norm: Any) -> None:
     """Draw one plane: colours, white without Mᵀ, markers on singular cells."""
     plane.cells(place, numbers, norm=norm, cmap="viridis")
     blank = (states != UNREACHABLE) & ~np.isfinite(numbers)
@@ -130,21 +133,21 @@ def _distances(place: Any, plane: MapPlane, numbers: Array, states: NDArray[np.s
             *plane.at(plane.x[i], plane.y[j]),
             marker=mark,
             s=26,
-            color=palette.colour("step4"),
+            color=palette.get_colour("step4"),
             edgecolor="white",
             linewidth=0.6,
         )
 
 
-def _distance_curve(grid: GridCheck, numbers: Array, states: NDArray[np.str_], paper: Paper) -> Any:
+def _draw_distance_curve(grid: GridCheck, numbers: Array, states: NDArray[np.str_], paper: Paper) -> Any:
     ((name, values),) = grid.grid.axes
-    x = tick_values(name, values)
-    figure, (place,) = panels(1, 1, 7.0, 4.6, paper)
+    x = convert_to_ticks(name, values)
+    figure, (place,) = make_panels(1, 1, 7.0, 4.6, paper)
     low, high, ticks = _scale(numbers)
     floor = low / (high / low) ** 0.1 if np.nanmin(numbers) < low else low
     place.semilogy(x, np.where(numbers < low, np.nan, numbers), ".-", color="C0")
     place.minorticks_off()
-    place.set_yticks(list(ticks), labels=tick_words(ticks))
+    place.set_yticks(list(ticks), labels=format_ticks(ticks))
     for state, (mark, _) in MARKS.items():
         hit = states == state
         place.scatter(
@@ -152,20 +155,20 @@ def _distance_curve(grid: GridCheck, numbers: Array, states: NDArray[np.str_], p
             np.fmax(numbers[hit], floor),
             marker=mark,
             s=36,
-            color=palette.colour("step4"),
+            color=palette.get_colour("step4"),
             edgecolor="white",
             linewidth=0.6,
             zorder=3,
         )
-    along(place, name, x, states == UNREACHABLE, VALUE)
+    label_curve(place, name, x, states == UNREACHABLE, VALUE)
     return figure
 
 
 def _scale(numbers: Array) -> tuple[float, float, Array]:
     """Return the ends and ticks of a logarithmic scale for values that may be zero."""
     high = float(np.nanmax(numbers)) or 1.0
-    regular = numbers[numbers > DISTANCE_FLOOR * high]
-    low = float(regular.min()) if regular.size else DISTANCE_FLOOR * high
+    regular = numbers[numbers > MAP_DISTANCE_FLOOR_FRACTION * high]
+    low = float(regular.min()) if regular.size else MAP_DISTANCE_FLOOR_FRACTION * high
     low = low if low < 0.9 * high else 0.5 * high
     return low, high, round_ticks(low, high)
 
@@ -180,7 +183,7 @@ def check_table(found: Check) -> bytes:
     for i, (pose, state) in enumerate(zip(grid.grid.poses(), grid.states, strict=True)):
         values = ["/".join(map(repr, pose.given[name])) for name in given]
         rows.append([*values, state, *("" if column[i] is None else repr(column[i]) for column in columns)])
-    return csv_bytes(rows)
+    return encode_csv(rows)
 
 
 def require_plane(setup: ObservedRobot, plane: Pose | str | None = None, **_: Any) -> None:
@@ -190,21 +193,21 @@ def require_plane(setup: ObservedRobot, plane: Pose | str | None = None, **_: An
     require_plane(setup, plane)
 
 
-def locus(found: Singularity, plane: Pose | str | None, steps: int, seed: int) -> Locus:
+def compute_singular_locus(found: Singularity, plane: Pose | str | None, steps: int, seed: int) -> Locus:
     """Compute the Type 2 locus over a plane of poses."""
-    from ..analysis.singularity.locus import locus
+    from ..analysis.singularity.locus import compute_locus
 
-    return locus(found.setup, plane=plane, steps=steps, seed=seed)
+    return compute_locus(found.setup, plane=plane, steps=steps, seed=seed)
 
 
 @in_style
-def locus_map(found: Singularity, drawn: Locus, paper: Paper = PNG) -> bytes:
+def draw_locus_map(found: Singularity, drawn: Locus, paper: Paper = PNG) -> bytes:
     """Draw the Type 2 loci of the hidden and the real robot over a plane, the Type 1 boundary and unreached poses."""
     from matplotlib.patches import Patch
 
     plane = MapPlane.of(drawn.grid.axes, found.setup.motion, 0.4, 1.6)
-    figure, (place,) = panels(1, 1, 7.2, 6.0 * plane.tall + 1.6, paper)
-    shade = np.log10(np.maximum(drawn.hidden.type2, DARKEST_DISTANCE))
+    figure, (place,) = make_panels(1, 1, 7.2, 6.0 * plane.tall + 1.6, paper)
+    shade = np.log10(np.maximum(drawn.hidden.type2, DARKEST_SINGULAR_VALUE_MAX))
     plane.cells(
         place,
         np.where(np.isfinite(drawn.hidden.type2), shade, np.nan),
@@ -212,18 +215,18 @@ def locus_map(found: Singularity, drawn: Locus, paper: Paper = PNG) -> bytes:
         vmin=np.nanmin(shade),
         vmax=np.nanmax(shade) + 1.0,
     )
-    borders = _boundary(place, plane, drawn)
+    borders = _draw_boundary(place, plane, drawn)
     entries: list[Any] = []
     for name, field in (("real robot", drawn.real), ("hidden robot", drawn.hidden)):
         if field is not None:
-            entries.insert(0, _drawn_locus(place, plane, field, name))
+            entries.insert(0, _draw_locus_curve(place, plane, field, name))
     plane.finish(place, plane.x, plane.y)
     entries += [Patch(facecolor="0.5", label="darker: closer to Type 2"), *borders]
     if not np.isfinite(drawn.hidden.type2).all():
-        entries.append(missing_entry())
+        entries.append(make_missing_entry())
     entries += plane.robot(figure, found.setup.all_samples.start)
-    plots.legend(figure, entries, paper)
-    heading(
+    plots.draw_legend(figure, entries, paper)
+    draw_heading(
         figure,
         f"{found.setup.robot.name}: Type 2 singularities, legs {', '.join(found.setup.labels)} observed",
         drawn.grid.fixed,
@@ -231,22 +234,22 @@ def locus_map(found: Singularity, drawn: Locus, paper: Paper = PNG) -> bytes:
     return print_figure(figure, paper)
 
 
-def _drawn_locus(place: Any, plane: MapPlane, field: SingularityMap, name: str) -> Any:
+def _draw_locus_curve(place: Any, plane: MapPlane, field: SingularityMap, name: str) -> Any:
     """Draw the Type 2 locus, as a curve or as points; return its entry in the legend."""
     colour, style, mark = LOCI[name]
     met = field.signed and plane.sign_change(place, field.value, colour, 2.0, style)
     if len(field.spots):
         place.plot(*plane.spots(field.spots), mark, color=colour, markeredgecolor="white", markersize=9)
     if len(field.curve):
-        _pieces(place, plane, field.curve, colors=colour, linewidths=2.0, linestyles=style)
+        _draw_pieces(place, plane, field.curve, colors=colour, linewidths=2.0, linestyles=style)
     shape = {"linestyle": style} if field.signed or len(field.curve) else {"linestyle": "", "marker": mark}
     met = met or bool(len(field.spots) or len(field.curve))
     never = " (never)" if field.everywhere else " (never where examined)"
     lacking = "" if met else never if field.never else " (none found)"
-    return entry(f"{name}: Type 2{lacking}", color=colour, linewidth=2.0, **shape)
+    return make_legend_entry(f"{name}: Type 2{lacking}", color=colour, linewidth=2.0, **shape)
 
 
-def _boundary(place: Any, plane: MapPlane, drawn: Locus) -> list[Any]:
+def _draw_boundary(place: Any, plane: MapPlane, drawn: Locus) -> list[Any]:
     """Draw the boundary of the reached poses, coloured near a Type 1 singularity; return the entries of the legend."""
     reached = np.isfinite(drawn.hidden.type2)
     padded = np.pad(reached, 1, mode="edge")
@@ -257,7 +260,7 @@ def _boundary(place: Any, plane: MapPlane, drawn: Locus) -> list[Any]:
         if field is not None:
             padded = np.pad(np.where(reached, field.type1, np.inf), 2, constant_values=np.inf)
             around = [padded[i : i + reached.shape[0], j : j + reached.shape[1]] for i in range(5) for j in range(5)]
-            near |= np.min(around, axis=0) < NEAR_TYPE_1 * np.nanmedian(field.type1)
+            near |= np.min(around, axis=0) < TYPE_1_BOUNDARY_FRACTION * np.nanmedian(field.type1)
     entries = []
     for cells, colour, words in (
         (border & near, palette.SERIES[1], "Type 1 boundary"),
@@ -266,12 +269,12 @@ def _boundary(place: Any, plane: MapPlane, drawn: Locus) -> list[Any]:
         i, j = np.nonzero(cells)
         if len(i):
             place.scatter(*plane.at(plane.x[i], plane.y[j]), s=9, color=colour, marker="o", linewidth=0)
-            entries.append(entry(words, linestyle="", marker="o", markersize=4, color=colour))
+            entries.append(make_legend_entry(words, linestyle="", marker="o", markersize=4, color=colour))
     return entries
 
 
 @in_style
-def error_map(found: Accuracy, paper: Paper = PNG) -> bytes:
+def draw_error_map(found: Accuracy, paper: Paper = PNG) -> bytes:
     """Draw position and orientation errors: maps with the Type 2 locus and the workspace boundary for a plane, a row of
     maps for a box, curves for a line."""
     field = found.field
@@ -284,18 +287,18 @@ def error_map(found: Accuracy, paper: Paper = PNG) -> bytes:
     if not shown:
         raise BadRequest("there is nothing to draw: the platform has no error", remedy="Choose another robot or grid.")
     figure, locus = (
-        _error_curves(field, shown, paper)
+        _draw_error_curves(field, shown, paper)
         if field.grid.ndim == 1
-        else _error_maps(field, shown, found.setup.motion, paper)
+        else _draw_error_maps(field, shown, found.setup.motion, paper)
     )
-    plots.legend(figure, _error_entries(field, locus) + _robot(figure, field.grid, found.setup), paper)
+    plots.draw_legend(figure, _list_error_entries(field, locus) + _draw_robot(figure, field.grid, found.setup), paper)
     legs = ", ".join(f"{o.leg} {found.bounds.words(i, o)}" for i, o in enumerate(found.setup.observed))
-    what = "observed legs" if all(o.by_segment for o in found.setup.observed) else "observed"
-    heading(figure, f"{found.setup.robot.name}: largest errors\n{what}: {legs}", field.grid.fixed, "; ")
+    what = "observed legs" if all(o.is_segment_direction for o in found.setup.observed) else "observed"
+    draw_heading(figure, f"{found.setup.robot.name}: largest errors\n{what}: {legs}", field.grid.fixed, "; ")
     return print_figure(figure, paper)
 
 
-def _error_maps(
+def _draw_error_maps(
     field: ErrorField, shown: list[tuple[Array, str]], motion: PlatformMotion, paper: Paper
 ) -> tuple[Any, bool]:
     """Return the figure, and whether a Type 2 singularity is in it."""
@@ -304,7 +307,7 @@ def _error_maps(
     made = PoseMap.of(field.grid, motion, paper, len(shown))
     plane, flat, locus = made.plane, field.grid.ndim == 2, False
     for number, (values, label) in enumerate(shown):
-        low, high = _ends(values)
+        low, high = _choose_scale_ends(values)
         norm = LogNorm(low, high)
         for k, (place, layer) in enumerate(made.layers(values, number)):
             plane.cells(place, np.where(np.isinf(layer), high, layer), norm=norm, cmap=ERRORS)
@@ -317,7 +320,7 @@ def _error_maps(
     return made.figure, (flat and _locus(field, [place for (place,) in made.maps], plane)) or locus
 
 
-def _ends(values: Array, highest: float = HIGHEST) -> tuple[float, float]:
+def _choose_scale_ends(values: Array, highest: float = ERROR_SCALE_END_FRACTION) -> tuple[float, float]:
     """Return the ends of a logarithmic scale: the smallest error, and the largest unless it is far above the median."""
     finite = values[np.isfinite(values) & (values > 0)]
     low, high = float(finite.min()), float(min(finite.max(), highest * np.median(finite)))
@@ -326,15 +329,15 @@ def _ends(values: Array, highest: float = HIGHEST) -> tuple[float, float]:
 
 def _locus(field: ErrorField, places: Any, plane: MapPlane) -> bool:
     """Draw the Type 2 locus, white on black; return True if there is one."""
-    from ..analysis.accuracy.singular_search import singular_poses
+    from ..analysis.accuracy.singular_search import find_singular_poses
 
     if field.determinant is not None:
         return all([_draw_loss(place, plane, field.determinant) for place in places])
     if field.curve is not None:
         for place, (colour, width) in product(places, STROKES):
-            _pieces(place, plane, field.curve, colors=colour, linewidths=width)
+            _draw_pieces(place, plane, field.curve, colors=colour, linewidths=width)
         return len(field.curve) > 0
-    spots = singular_poses(field)
+    spots = find_singular_poses(field)
     for place in places if len(spots) else ():
         place.plot(
             *plane.spots(spots), "o", color="white", markeredgecolor="black", markersize=3.2, markeredgewidth=0.7
@@ -347,27 +350,27 @@ def _draw_loss(place: Any, plane: MapPlane, determinant: Array) -> bool:
     return all([plane.sign_change(place, determinant, colour, width) for colour, width in STROKES])
 
 
-def _pieces(place: Any, plane: MapPlane, curve: Array, **style: Any) -> None:
+def _draw_pieces(place: Any, plane: MapPlane, curve: Array, **style: Any) -> None:
     """Draw pieces (k, 2, 2) of a curve."""
     from matplotlib.collections import LineCollection
 
     place.add_collection(LineCollection(list(np.stack(plane.at(curve[..., 0], curve[..., 1]), axis=-1)), **style))
 
 
-def _error_curves(field: ErrorField, shown: list[tuple[Array, str]], paper: Paper) -> tuple[Any, bool]:
+def _draw_error_curves(field: ErrorField, shown: list[tuple[Array, str]], paper: Paper) -> tuple[Any, bool]:
     ((name, values),) = field.grid.axes
-    x = tick_values(name, values)
-    figure, axes = panels(len(shown), 1, 7.0, 3.0 * len(shown) + 1.2, paper)
+    x = convert_to_ticks(name, values)
+    figure, axes = make_panels(len(shown), 1, 7.0, 3.0 * len(shown) + 1.2, paper)
     for place, (errors, label) in zip(axes, shown, strict=True):
         place.semilogy(x, np.where(np.isfinite(errors), errors, np.nan), ".-", color="C0")
         place.minorticks_off()
-        ticks = round_ticks(*_ends(np.where(np.isfinite(errors), errors, np.nan), np.inf))
-        place.set_yticks(list(ticks), labels=tick_words(ticks))
-        along(place, name, x, np.isnan(errors), label)
+        ticks = round_ticks(*_choose_scale_ends(np.where(np.isfinite(errors), errors, np.nan), np.inf))
+        place.set_yticks(list(ticks), labels=format_ticks(ticks))
+        label_curve(place, name, x, np.isnan(errors), label)
     return figure, False
 
 
-def _error_entries(field: ErrorField, locus: bool) -> list[Any]:
+def _list_error_entries(field: ErrorField, locus: bool) -> list[Any]:
     """Return the legend entries of white lines or points, black lines and hatching."""
     from matplotlib.patheffects import Normal, Stroke
 
@@ -377,7 +380,7 @@ def _error_entries(field: ErrorField, locus: bool) -> list[Any]:
         spots = field.determinant is None and field.curve is None
         mark = {"marker": "o", "linestyle": ""} if spots else {"path_effects": outlined}
         entries.append(
-            entry(
+            make_legend_entry(
                 "Type 2 singularities of the hidden robot",
                 color="white",
                 linewidth=1.6,
@@ -386,15 +389,15 @@ def _error_entries(field: ErrorField, locus: bool) -> list[Any]:
             )
         )
     elif field.grid.ndim > 2 and field.determinant is None:
-        entries.append(entry("Type 2 singularities are not drawn", linestyle=""))
+        entries.append(make_legend_entry("Type 2 singularities are not drawn", linestyle=""))
     if not field.reached.all():
         if field.grid.ndim > 1:
-            entries.append(entry("workspace boundary", color="black", linewidth=1.6))
-        entries.append(missing_entry())
+            entries.append(make_legend_entry("workspace boundary", color="black", linewidth=1.6))
+        entries.append(make_missing_entry())
     return entries
 
 
-def error_table(found: Accuracy) -> Iterator[bytes]:
+def format_error_table(found: Accuracy) -> Iterator[bytes]:
     """Yield comma-separated values: a line per pose (metres, radians), empty if not reached, inf at Type 2
     singularities."""
     field = found.field

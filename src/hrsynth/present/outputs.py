@@ -16,7 +16,7 @@ from typing import Any
 from ..errors import BadRequest
 from ..options import Option
 from ..results import Result
-from .text.tables import csv_bytes
+from .text.tables import encode_csv
 
 Content = bytes | Iterable[bytes]
 Asked = Mapping[str, Any]
@@ -25,7 +25,7 @@ PNG, CSV, HTML = ".png", ".csv", (".html", ".htm")
 FIGURES = (PNG, ".pdf", ".svg")
 
 
-def function(name: str | Callable[..., Any]) -> Callable[..., Any]:
+def load_function(name: str | Callable[..., Any]) -> Callable[..., Any]:
     """Return the function ``module:function`` of this folder or ``.module:function`` of the package."""
     if callable(name):
         return name
@@ -87,7 +87,7 @@ class File:
                     f"--{name}: no figure is written", asked[name], remedy=f"Add --output with {', '.join(FIGURES)}."
                 )
             if asked.get(name) is not None:
-                function("figure_format:paper_for")(PNG, asked.get("width"), asked.get("font"))
+                load_function("figure_format:choose_paper")(PNG, asked.get("width"), asked.get("font"))
         if path is None:
             if asked.get("plane") is not None and "plane" in self.takes:
                 raise BadRequest("--plane: no figure is written", asked["plane"], remedy="Add -o FILE.png.")
@@ -100,9 +100,9 @@ class File:
         if ending not in known:
             raise BadRequest(f"{self.refusal}: unknown extension", path, self.allowed or known)
         if ending in self.plotted:
-            function("plots:library")()
+            load_function("plots:require_matplotlib")()
         if self.installed is not None and ending == self.installed[0]:
-            function(self.installed[1])()
+            load_function(self.installed[1])()
         require_writable(path)
 
     def require_drawable(self, path: str | None, robot: Any, asked: Asked) -> None:
@@ -111,7 +111,9 @@ class File:
             from ..analysis.observed import ObservedRobot
 
             watched = {name: asked[name] for name in ("observe", "camera", "sensor", "seed") if name in asked}
-            function(self.limited[1])(ObservedRobot.of(robot, **watched), **{name: asked[name] for name in self.takes})
+            load_function(self.limited[1])(
+                ObservedRobot.of(robot, **watched), **{name: asked[name] for name in self.takes}
+            )
 
     def question_fields(self, path: str | None) -> dict[str, str]:
         """Return the parameter of an analysis that writes the file itself."""
@@ -125,19 +127,19 @@ class File:
 
     def unwritten(self, found: Any, path: str) -> str | None:
         """Return the message if there is nothing to write."""
-        why = None if self.nothing is None else function(self.nothing)(found)
+        why = None if self.nothing is None else load_function(self.nothing)(found)
         return None if why is None else f"{path} is not drawn: {why}"
 
     def content(self, found: Any, ending: str, asked: Asked) -> tuple[Content, dict[str, Any]]:
         """Return the content of the file and further JSON fields; raise ``BadRequest`` if there is nothing to draw."""
-        maker = function(self.makers[ending])
+        maker = load_function(self.makers[ending])
         if ending in FIGURES and self.drawn:
             maker = partial(
-                maker, paper=function("figure_format:paper_for")(ending, asked.get("width"), asked.get("font"))
+                maker, paper=load_function("figure_format:choose_paper")(ending, asked.get("width"), asked.get("font"))
             )
         if self.computed is None:
             return maker(found), {}
-        value = function(self.computed)(found, **{name: asked[name] for name in (*self.takes, "seed")})
+        value = load_function(self.computed)(found, **{name: asked[name] for name in (*self.takes, "seed")})
         return maker(found, value), {} if self.record is None else {self.record: value.to_dict()}
 
     def writer(self, found: Any, path: str, asked: Asked) -> tuple[Callable[[], object], dict[str, Any]]:
@@ -155,16 +157,16 @@ class HiddenFile(File):
 
     def require(self, path: str | None, asked: Asked) -> None:
         """Raise ``BadRequest`` for the suffix of no format."""
-        from ..description import targets
+        from ..description import list_save_targets
 
         if path is not None:
-            targets(path)
+            list_save_targets(path)
 
     def sentence(self, path: str) -> str:
         """Report all files of a format."""
-        from ..description import targets
+        from ..description import list_save_targets
 
-        return super().sentence(" and ".join(map(str, targets(path))))
+        return super().sentence(" and ".join(map(str, list_save_targets(path))))
 
     def unwritten(self, found: Any, path: str) -> str | None:
         """Return the message if there is no hidden robot."""
@@ -197,7 +199,7 @@ class CodeFile(File):
             )
 
 
-def figures(maker: str) -> dict[str, str]:
+def map_figure_endings(maker: str) -> dict[str, str]:
     """Return one maker for all suffixes of a figure."""
     return dict.fromkeys(FIGURES, maker)
 
@@ -221,11 +223,11 @@ CERTIFICATE = File(
 )
 OUTPUTS = {
     "accuracy": Outputs(
-        "text.runs:accuracy",
+        "text.runs:format_accuracy",
         (
             File(
                 "cannot write the errors",
-                {**figures("maps:error_map"), CSV: "maps:error_table"},
+                {**map_figure_endings("maps:draw_error_map"), CSV: "maps:format_error_table"},
                 "The map of errors",
                 "Write the plane or grid: map.png, .pdf, .svg; a table, map.csv; or an array, map.npy, part by part: "
                 "up to 10^10 poses, and after an interruption the same command continues.",
@@ -237,43 +239,43 @@ OUTPUTS = {
             ),
         ),
     ),
-    "advise": Outputs("text.robots:advice"),
+    "advise": Outputs("text.robots:format_advice"),
     "aspects": Outputs(
-        "text.poses:aspects",
+        "text.poses:format_aspects",
         (
             File(
                 "cannot draw the aspects",
-                figures("aspects:picture"),
+                map_figure_endings("aspects:draw_aspects"),
                 "The figure of the aspects",
                 "Draw the table and, for three rods on cranks in a plane, the singular curve with the modes: "
                 "aspects.png, .pdf, .svg.",
-                computed="aspects:section",
+                computed="aspects:compute_section",
                 record="section",
-                nothing="aspects:undrawn",
+                nothing="aspects:explain_no_table",
                 drawn=True,
             ),
         ),
     ),
     "basins": Outputs(
-        "text.runs:basins",
+        "text.runs:format_basins",
         (
             File(
                 "cannot write the basins",
-                {**figures("basins:picture"), CSV: "basins:table"},
+                {**map_figure_endings("basins:draw_basins"), CSV: "basins:format_basin_table"},
                 "The map of basins",
                 "Draw where each start ends: basins.png, .pdf, .svg, or a table, basins.csv.",
                 drawn=True,
             ),
         ),
     ),
-    "branch": Outputs("text.branches:branch"),
-    "certificate": Outputs("text.robots:certificate"),
+    "branch": Outputs("text.branches:format_branch"),
+    "certificate": Outputs("text.robots:format_certificate"),
     "check": Outputs(
         "text.poses:check",
         (
             File(
                 "cannot write the grid",
-                {**figures("maps:distance_map"), CSV: "maps:check_table"},
+                {**map_figure_endings("maps:draw_distance_map"), CSV: "maps:check_table"},
                 "The grid",
                 "Write the grid: map.png, .pdf, .svg, or a table, map.csv.",
                 part="grid",
@@ -284,31 +286,31 @@ OUTPUTS = {
         ),
     ),
     "derive": Outputs(
-        "text.robots:derivation",
+        "text.robots:format_derivation",
         (
             HiddenFile(
                 "cannot write the robot", {}, "The hidden robot", "Write the hidden robot.", field="hidden_file"
             ),
             File(
                 "cannot write the report",
-                dict.fromkeys(HTML, "report.pages:page"),
+                dict.fromkeys(HTML, "report.pages:render_report"),
                 "The report",
                 "Write a page (.html) with drawings, proof, singularities, assembly modes and accuracy.",
                 "report",
                 "report_file",
-                computed="report.parts:parts",
+                computed="report.parts:collect_report_parts",
                 plotted=HTML,
             ),
             CERTIFICATE,
-            File("cannot draw the robots", {".svg": "drawings.schematic:derivation_svg"}, option=None, plotted=()),
+            File("cannot draw the robots", {".svg": "drawings.schematic:draw_derivation_svg"}, option=None, plotted=()),
         ),
     ),
     "equilibria": Outputs(
-        "text.equilibria:equilibria",
+        "text.equilibria:format_equilibria",
         (
             File(
                 "cannot draw the equilibria",
-                figures("equilibria:picture"),
+                map_figure_endings("equilibria:draw_equilibria"),
                 "The figure of the equilibria",
                 "Draw the equilibria: equilibria.png, .pdf, .svg.",
                 drawn=True,
@@ -320,39 +322,39 @@ OUTPUTS = {
         (
             CodeFile(
                 "cannot write the code",
-                dict.fromkeys((".hpp", ".h", ".py"), "text.robots:code"),
+                dict.fromkeys((".hpp", ".h", ".py"), "text.robots:encode_program"),
                 "The code",
                 "Write the code: robot.hpp (C++), robot.py (NumPy).",
                 plotted=(),
             ),
         ),
     ),
-    "legs": Outputs("text.robots:legs"),
+    "legs": Outputs("text.robots:format_legs"),
     "lint": Outputs("text.lint:lint"),
-    "loop_check": Outputs("text.poses:loop_check"),
+    "loop_check": Outputs("text.poses:format_loop_check"),
     "modes": Outputs(
-        "text.poses:modes",
+        "text.poses:format_modes",
         (
             File(
                 "cannot draw the modes",
-                figures("modes:picture"),
+                map_figure_endings("modes:draw_modes"),
                 "The figure of the modes",
                 "Draw the modes: modes.png, .pdf, .svg.",
-                nothing="modes:why_undrawn",
+                nothing="modes:explain_no_figure",
                 drawn=True,
             ),
             CERTIFICATE,
         ),
     ),
-    "path": Outputs("text.poses:path", (CERTIFICATE,)),
-    "robot": Outputs("text.robots:robot"),
-    "select": Outputs("text.runs:selection"),
+    "path": Outputs("text.poses:format_path", (CERTIFICATE,)),
+    "robot": Outputs("text.robots:format_robot"),
+    "select": Outputs("text.runs:format_selection"),
     "servo": Outputs(
-        "text.runs:servo",
+        "text.runs:format_run",
         (
             File(
                 "cannot draw the run",
-                {**figures("runs:picture"), ".gif": "animations:animation"},
+                {**map_figure_endings("runs:draw_run"), ".gif": "animations:draw_animation"},
                 "The figure of the run",
                 "Draw the run: curves (run.png, .pdf, .svg) or an animation (run.gif).",
                 allowed=".png, .pdf, .svg (curves) or .gif (camera view)",
@@ -364,14 +366,14 @@ OUTPUTS = {
         ),
     ),
     "singularities": Outputs(
-        "text.poses:singularity",
+        "text.poses:format_singularity",
         (
             File(
                 "cannot draw the locus",
-                figures("maps:locus_map"),
+                map_figure_endings("maps:draw_locus_map"),
                 "The locus",
                 "Draw the locus: locus.png, .pdf, .svg.",
-                computed="maps:locus",
+                computed="maps:compute_singular_locus",
                 asks=(
                     Option("plane", "Plane of poses to draw, such as z=-0.7.", "PART=VALUE"),
                     Option("steps", "Poses along each side of the plane.", None, int, 51, low=5, high=300),
@@ -382,41 +384,41 @@ OUTPUTS = {
             ),
         ),
     ),
-    "verdict": Outputs("text.robots:verdict"),
+    "verdict": Outputs("text.robots:format_verdict"),
     "view": Outputs(
-        "text.robots:view",
+        "text.robots:format_view",
         (
             File(
                 "cannot write the view",
-                dict.fromkeys(HTML, "studio.saved:static"),
+                dict.fromkeys(HTML, "studio.saved:render_static_page"),
                 "The view",
                 "Write a page that needs no server (.html).",
                 "static",
                 allowed=".html",
             ),
         ),
-        inline="studio.saved:inline",
+        inline="studio.saved:format_inline",
     ),
 }
 """Outputs by the name under which a result is shown (:attr:`hrsynth.results.Result.shown_as`): its command, or its
 kind if it is a part of a result."""
 
 
-def outputs_of(name: str) -> Outputs:
+def get_outputs(name: str) -> Outputs:
     """Return the outputs of a kind of result: those of the table, else those that its class defines."""
     if name in OUTPUTS:
         return OUTPUTS[name]
     kind = Result.answer_of(name)
     makers: dict[str, str | Callable[..., Any]] = {}
     if kind.plot is not Result.plot:
-        makers |= dict.fromkeys(FIGURES, "plots:drawn_by")
+        makers |= dict.fromkeys(FIGURES, "plots:draw_own_figure")
     if kind.rows is not Result.rows:
-        makers[CSV] = _csv
+        makers[CSV] = _format_csv
     help = f"Write {name}{', '.join(makers)}."
     file = File(f"cannot write the result of {name}", makers, f"The result of {name}", help, drawn=PNG in makers)
     return Outputs(kind.text, (file,) if makers else ())
 
 
-def _csv(found: Result) -> bytes:
+def _format_csv(found: Result) -> bytes:
     """The rows of an answer as comma-separated values."""
-    return csv_bytes(found.rows())
+    return encode_csv(found.rows())

@@ -47,27 +47,27 @@ PAGE = {
 """Text, lines and backgrounds of pages and drawings; pressed and selected elements; good, partial and bad results."""
 SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Colours of curves without a meaning, in the order of the style of all plots."""
-TINT = 0.4
+SYMBOL_TINT_FRACTION = 0.4
 """Fraction of its colour inside a symbol; its complement is white."""
 
 
-def colour(meaning: str) -> str:
+def get_colour(meaning: str) -> str:
     """Return the colour of a meaning."""
     return MEANINGS[meaning][1]
 
 
-def tint(colour: str, share: float = TINT) -> str:
+def make_tint(colour: str, share: float = SYMBOL_TINT_FRACTION) -> str:
     """Mix a colour with white."""
     parts = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
     return "#" + "".join(f"{round(255 + share * (part - 255)):02x}" for part in parts)
 
 
-def css() -> str:
+def format_css() -> str:
     """Format the colours as variables of a style sheet."""
-    every = {**PAGE, **{name: colour(name) for name in MEANINGS}, "driven": tint(colour("motor"))}
+    every = {**PAGE, **{name: get_colour(name) for name in MEANINGS}, "driven": make_tint(get_colour("motor"))}
     return ":root { " + " ".join(f"--{name}: {value};" for name, value in every.items()) + " }\n"
 
 
-def js() -> str:
+def format_js() -> str:
     """Format the meanings as a script, for ``colours.js``."""
     return f"const COLOURS = {json.dumps(MEANINGS)};\n"

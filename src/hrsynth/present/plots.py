@@ -17,19 +17,19 @@ from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import PlatformMotion
 from ..mechanism.pose import Pose
 from ..results import Result
-from .figure_format import BESIDE, PNG, Paper, legend_within, print_figure
-from .skeleton import legs_of, outline
-from .sketch import Sketch, axis_label
-from .view.view import plane_normal
+from .figure_format import BESIDE, PNG, Paper, draw_legend_within, print_figure
+from .skeleton import trace_leg_outlines, trace_link_outline
+from .sketch import Sketch, label_axis
+from .view.view import find_plane_normal
 
 STYLE = "hrsynth.present.style"
 """Style of all plots, ``style.mplstyle`` of this folder."""
-PAD = 0.07
+FIGURE_PADDING_INCHES_MIN = 0.07
 """Left free about axes, titles and legends (inches)."""
-FEWEST_TICKS = 3
+AXIS_TICKS_MIN = 3
 OWN_WIDTH, OWN_HEIGHT = 4.5, 3.5
 """A figure that an answer draws itself (inches)."""
-PLACES = 6
+PRINTED_DECIMALS_COUNT = 6
 """Decimals of metres and degrees in words."""
 Asked = ParamSpec("Asked")
 Given = TypeVar("Given")
@@ -40,7 +40,7 @@ ROBOT: dict[str, Any] = {"color": "black", "alpha": 0.3, "linewidth": 1.2}
 """How a robot is drawn in a map of its poses."""
 
 
-def library() -> None:
+def require_matplotlib() -> None:
     """Raise ``MissingExtra`` if matplotlib is not installed."""
     if find_spec("matplotlib") is None:
         raise MissingExtra("drawing", "plots")
@@ -51,7 +51,7 @@ def in_style(draw: Callable[Asked, Given]) -> Callable[Asked, Given]:
 
     @wraps(draw)
     def drawn(*given: Asked.args, **named: Asked.kwargs) -> Given:
-        library()
+        require_matplotlib()
         import matplotlib.style
 
         with matplotlib.style.context([STYLE, {"text.parse_math": False}]), warnings.catch_warnings():
@@ -61,7 +61,7 @@ def in_style(draw: Callable[Asked, Given]) -> Callable[Asked, Given]:
     return drawn
 
 
-def empty_figure(width: float, height: float, **style: Any) -> Any:
+def make_empty_figure(width: float, height: float, **style: Any) -> Any:
     """A figure of this size (inches) without axes."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -71,7 +71,7 @@ def empty_figure(width: float, height: float, **style: Any) -> Any:
     return figure
 
 
-def panels(
+def make_panels(
     rows: int,
     columns: int,
     width: float,
@@ -84,17 +84,17 @@ def panels(
     with axes of the same shape; ``around`` is what is not axes, ``least`` the width that each needs."""
     wide = paper.axes(width, least * columns)
     height = around[1] + (height - around[1]) * (wide - around[0]) / (width - around[0])
-    figure = empty_figure(wide, height, layout="constrained")
-    figure.get_layout_engine().set(w_pad=PAD, h_pad=PAD)
+    figure = make_empty_figure(wide, height, layout="constrained")
+    figure.get_layout_engine().set(w_pad=FIGURE_PADDING_INCHES_MIN, h_pad=FIGURE_PADDING_INCHES_MIN)
     return figure, figure.subplots(rows, columns, squeeze=False).ravel()
 
 
-def tick_values(name: str, values: Array) -> Array:
+def convert_to_ticks(name: str, values: Array) -> Array:
     """The values of a part of a pose as they are drawn: angles in degrees."""
     return np.degrees(values) if name == "phi" else values
 
 
-def cell_edges(values: Array) -> Array:
+def compute_cell_edges(values: Array) -> Array:
     """The borders of cells around equally spaced values."""
     half = (values[1] - values[0]) / 2
     return np.append(values - half, values[-1] + half)
@@ -110,13 +110,13 @@ def round_ticks(low: float, high: float) -> Array:
     for steps in ((1.0,), (1.0, 2.0, 5.0)):
         found = np.sort(np.outer(powers, steps).ravel())
         found = found[(found >= low - slack) & (found <= high + slack)]
-        if len(found) >= FEWEST_TICKS:
+        if len(found) >= AXIS_TICKS_MIN:
             return np.asarray(found[:: -(-len(found) // 8)])
     even = np.array(MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(low, high))
     return np.asarray(even[(even >= low - slack) & (even <= high + slack)])
 
 
-def tick_words(ticks: Array) -> list[str]:
+def format_ticks(ticks: Array) -> list[str]:
     """Round numbers as they are written."""
     return [
         np.format_float_positional(value, 3, fractional=False, trim="-")
@@ -148,7 +148,11 @@ class MapPlane:
         """The first two axes of a grid; height over width between ``least`` and ``most``."""
         (xname, xs), (yname, ys) = axes[:2]
         made = cls(
-            (xname, yname), tick_values(xname, xs), tick_values(yname, ys), 0.8, *_own_axes((xname, yname), motion)
+            (xname, yname),
+            convert_to_ticks(xname, xs),
+            convert_to_ticks(yname, ys),
+            0.8,
+            *_choose_own_axes((xname, yname), motion),
         )
         if not {xname, yname} <= set("xyz"):
             return made
@@ -157,7 +161,7 @@ class MapPlane:
 
     def spots(self, values: Array) -> tuple[Array, Array]:
         """Return the positions in the map of poses whose two coordinates have ``values`` (n, 2) (m, rad)."""
-        return self.at(*(tick_values(name, column) for name, column in zip(self.names, values.T, strict=True)))
+        return self.at(*(convert_to_ticks(name, column) for name, column in zip(self.names, values.T, strict=True)))
 
     def at(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Return the positions in the map of values of the two coordinates (of one shape, angles in degrees)."""
@@ -167,7 +171,7 @@ class MapPlane:
     def cells(self, place: Any, values: Array, **style: Any) -> None:
         """Colours, one a cell; hatched grey where a value is not finite, white beyond the grid."""
         place.grid(False)
-        corners = np.meshgrid(cell_edges(self.x), cell_edges(self.y), indexing="ij")
+        corners = np.meshgrid(compute_cell_edges(self.x), compute_cell_edges(self.y), indexing="ij")
         u, v = (each[[0, -1, -1, 0], [0, 0, -1, -1]] for each in self.at(*corners))
         place.fill(u, v, linewidth=0, zorder=0, **MISSING)
         place.pcolormesh(*self.at(*corners), np.ma.masked_invalid(values), **style)
@@ -179,15 +183,15 @@ class MapPlane:
         if not set(self.names) <= set("xyz"):
             return []
         platform = at.model.mechanism.platform
-        outer = outline(at.model.mechanism, platform, at.pose(platform))
-        strokes = [each for each in (*legs_of(at, (platform,)), outer) if np.ptp(each, axis=0).any()]
+        outer = trace_link_outline(at.model.mechanism, platform, at.pose(platform))
+        strokes = [each for each in (*trace_leg_outlines(at, (platform,)), outer) if np.ptp(each, axis=0).any()]
         if not strokes:
             return []
         for place in figure.axes:
             if place.get_visible() and place.get_label() != "<colorbar>":
                 drawn = LineCollection([stroke @ self.across.T for stroke in strokes], zorder=1.5, **ROBOT)
                 place.add_collection(drawn, autolim=False)
-        return [entry("robot at its zero pose", **ROBOT)]
+        return [make_legend_entry("robot at its zero pose", **ROBOT)]
 
     def contour(self, place: Any, values: Array, level: float, colour: str, width: float, style: str = "solid") -> None:
         """Draw where values are at a level."""
@@ -209,7 +213,7 @@ class MapPlane:
 
     def finish(self, place: Any, x: Array | None = None, y: Array | None = None) -> None:
         """Name the axes, show the values from the first to the last of ``x`` and ``y``; equal scales of two lengths."""
-        place.set(xlabel=axis_label(self.labels[0]), ylabel=axis_label(self.labels[1]))
+        place.set(xlabel=label_axis(self.labels[0]), ylabel=label_axis(self.labels[1]))
         if x is not None and y is not None:
             u, v = self.at(*np.meshgrid(x[[0, -1]], y[[0, -1]], indexing="ij"))
             place.set(xlim=(u.min(), u.max()), ylim=(v.min(), v.max()))
@@ -217,10 +221,10 @@ class MapPlane:
             place.set_aspect("equal")
 
 
-def _own_axes(names: tuple[str, str], motion: PlatformMotion) -> tuple[tuple[str, str], Array, Array, Array]:
+def _choose_own_axes(names: tuple[str, str], motion: PlatformMotion) -> tuple[tuple[str, str], Array, Array, Array]:
     """The names of the axes along which a pose is drawn, and how it lies along them: the parts themselves, but for a
     plane of motion that is no coordinate plane."""
-    normal = plane_normal(motion) if set(names) <= set("xyz") else None
+    normal = find_plane_normal(motion) if set(names) <= set("xyz") else None
     sketch = None if normal is None else Sketch.of(normal, np.zeros((1, 3)), ())
     if sketch is None or set(sketch.names) <= set("xyz"):
         return names, np.eye(2), np.zeros(2), np.eye(3)[["xyz".find(name) for name in names]]
@@ -232,7 +236,7 @@ def _own_axes(names: tuple[str, str], motion: PlatformMotion) -> tuple[tuple[str
     return (first, second), shear, sketch.axes @ (home - moved @ np.array(chosen) @ home), sketch.axes
 
 
-def outer(place: Any, k: int, columns: int, count: int) -> None:
+def remove_inner_labels(place: Any, k: int, columns: int, count: int) -> None:
     """Leave out the names and numbers of axes that stand at the map beside or below too: map ``k`` of ``count`` in
     ``columns`` has them at the left and where no map is below."""
     if k % columns:
@@ -243,54 +247,54 @@ def outer(place: Any, k: int, columns: int, count: int) -> None:
         place.tick_params(labelbottom=False)
 
 
-def layer_title(place: Any, name: str, value: float) -> None:
+def draw_layer_title(place: Any, name: str, value: float) -> None:
     """The value of the third part of a pose over a map."""
-    place.set_title(f"{axis_label(name)}: {value:.4g}", fontsize=10)
+    place.set_title(f"{label_axis(name)}: {value:.4g}", fontsize=10)
 
 
-def along(place: Any, name: str, x: Array, missing: Array, label: str, which: str = "major") -> None:
+def label_curve(place: Any, name: str, x: Array, missing: Array, label: str, which: str = "major") -> None:
     """Finish a curve over one part of a pose: names, grey where nothing is reached."""
-    edges = cell_edges(x)
+    edges = compute_cell_edges(x)
     for k in np.flatnonzero(missing):
         place.axvspan(edges[k], edges[k + 1], linewidth=0, **MISSING)
-    place.set(xlabel=axis_label(name), ylabel=label, xlim=(edges[0], edges[-1]))
+    place.set(xlabel=label_axis(name), ylabel=label, xlim=(edges[0], edges[-1]))
     place.grid(which=which)
 
 
-def heading(figure: Any, text: str, fixed: Pose, before: str = "\n") -> None:
+def draw_heading(figure: Any, text: str, fixed: Pose, before: str = "\n") -> None:
     """Set the title, followed by the fixed coordinates, angles in degrees."""
-    words = pose_words(fixed)
+    words = describe_pose(fixed)
     figure.suptitle(text + (f"{before}{words}" if words else ""))
 
 
-def pose_words(pose: Pose) -> str:
+def describe_pose(pose: Pose) -> str:
     """Format a pose with its units, angles in degrees."""
     told = Pose.parse(pose.shown) if pose.shown else pose
-    return ", ".join(_held_parts(name, values) for name, values in told.given.items())
+    return ", ".join(_describe_fixed_parts(name, values) for name, values in told.given.items())
 
 
-def _held_parts(name: str, values: Sequence[float]) -> str:
+def _describe_fixed_parts(name: str, values: Sequence[float]) -> str:
     if name in "xyz":
-        return f"{name} = {round(values[0], PLACES) + 0.0:.4g} m"
-    turned = "/".join(f"{value:.4g}" for value in np.round(np.degrees(values), PLACES) + 0.0)
+        return f"{name} = {round(values[0], PRINTED_DECIMALS_COUNT) + 0.0:.4g} m"
+    turned = "/".join(f"{value:.4g}" for value in np.round(np.degrees(values), PRINTED_DECIMALS_COUNT) + 0.0)
     return f"{'φ' if name == 'phi' else name} = {turned}°"
 
 
-def entry(label: str, **style: Any) -> Any:
+def make_legend_entry(label: str, **style: Any) -> Any:
     """A mark or line in a legend."""
     from matplotlib.lines import Line2D
 
     return Line2D([], [], label=label, **style)
 
 
-def missing_entry() -> Any:
+def make_missing_entry() -> Any:
     """Return the legend entry of unreached poses."""
     from matplotlib.patches import Patch
 
     return Patch(label="not reached", **MISSING)
 
 
-def legend(figure: Any, entries: Sequence[Any], paper: Paper) -> None:
+def draw_legend(figure: Any, entries: Sequence[Any], paper: Paper) -> None:
     """The legend beside the axes, or below where the paper is narrow, where there is something to explain."""
     wide = figure.get_figwidth()
     if not entries:
@@ -299,13 +303,13 @@ def legend(figure: Any, entries: Sequence[Any], paper: Paper) -> None:
         figure.set_figwidth(wide + BESIDE)
         figure.legend(handles=entries, loc="outside right center", labelspacing=0.8)
     else:
-        tall = legend_within(figure, list(entries), wide, loc="outside lower center")
+        tall = draw_legend_within(figure, list(entries), wide, loc="outside lower center")
         figure.set_figheight(figure.get_figheight() + tall)
 
 
 @in_style
-def drawn_by(found: Result, paper: Paper = PNG) -> bytes:
+def draw_own_figure(found: Result, paper: Paper = PNG) -> bytes:
     """The figure that an answer draws itself."""
-    figure = empty_figure(paper.wide(OWN_WIDTH), OWN_HEIGHT)
+    figure = make_empty_figure(paper.wide(OWN_WIDTH), OWN_HEIGHT)
     found.plot(figure.add_subplot())
     return print_figure(figure, paper)

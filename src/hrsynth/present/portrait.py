@@ -13,11 +13,11 @@ from ..geometry.vectors import Array
 from ..mechanism import Mechanism
 from .drawings import svg
 from .palette import PAGE
-from .sketch import Sketch, seen_along
-from .view.shapes import BASE, LEG, MOTOR, PLATFORM, RADIUS, Drawer
-from .view.view import plane_normal
+from .sketch import Sketch, compute_view_axes
+from .view.shapes import BASE, LEG, MOTOR, PLATFORM, ROD_RADIUS_FRACTION, Drawer
+from .view.view import find_plane_normal
 
-TRAVEL = 0.3
+RAIL_HALF_LENGTH_FRACTION = 0.3
 """Half of a rail that is drawn (characteristic lengths)."""
 SEEN = "seen"
 """Role of a link whose direction is observed."""
@@ -52,7 +52,7 @@ class Portrait:
             setup.mechanism,
             setup.decomposition.platform,
             {each.link for each in setup.observed},
-            plane_normal(setup.motion),
+            find_plane_normal(setup.motion),
         )
 
     @classmethod
@@ -60,8 +60,8 @@ class Portrait:
         cls, mechanism: Mechanism, platform: Collection[str], observed: Collection[str], normal: Array | None
     ) -> Portrait:
         """A mechanism at its zero configuration."""
-        drawer = Drawer(mechanism, mechanism, platform, RADIUS * mechanism.length)
-        way = TRAVEL * mechanism.length
+        drawer = Drawer(mechanism, mechanism, platform, ROD_RADIUS_FRACTION * mechanism.length)
+        way = RAIL_HALF_LENGTH_FRACTION * mechanism.length
         marks = []
         for shape in drawer.shapes({joint.name: (-way, way) for joint in drawer.sliders()}):
             role = SEEN if shape.link in observed and shape.joint is None else shape.role
@@ -80,9 +80,9 @@ class Portrait:
         areas = [mark.points for mark in self.marks if mark.kind == "area"]
         spots = np.vstack([mark.points for mark in self.marks if mark.kind == "dot"] or areas)
         seen = Sketch.of(self.normal, spots, areas)
-        if seen.flat:
+        if seen.is_flat:
             return np.vstack([seen.axes, np.cross(*seen.axes)])
-        return seen_along(seen.view)
+        return compute_view_axes(seen.view)
 
     def svg(self, width: float, height: float, title: str | None = None) -> str:
         """The drawing, as large as fits; small ones (thumbnails) have thinner strokes."""
@@ -104,7 +104,7 @@ class Portrait:
         for i in order:
             at = (seen[i][:, :2] - middle) * [scale, -scale] + [width / 2, height / 2]
             parts.append(_draw_mark(self.marks[i], [(float(x), float(y)) for x, y in at], thin))
-        return svg.picture(width, height, title or f"Drawing of {self.name}", self.words(), *parts)
+        return svg.format_drawing(width, height, title or f"Drawing of {self.name}", self.words(), *parts)
 
     def words(self) -> str:
         """The drawing in a sentence."""
@@ -121,9 +121,9 @@ def _draw_mark(mark: Mark, at: list[svg.Place], thin: float) -> str:
     """A mark on the page, a pale line about strokes so that what is nearer stands out."""
     if mark.kind == "area":
         colour, wide = STROKES[mark.role]
-        return svg.element(
+        return svg.format_element(
             "path",
-            d=svg.lines([at]) + "Z",
+            d=svg.format_lines([at]) + "Z",
             fill=FILLS.get(mark.role, svg.EMPTY),
             stroke=colour,
             stroke_width=wide * thin,
@@ -132,15 +132,15 @@ def _draw_mark(mark: Mark, at: list[svg.Place], thin: float) -> str:
         )
     if mark.kind == "line":
         colour, wide = STROKES[mark.role]
-        way = svg.lines([at])
-        return svg.element("path", d=way, stroke=svg.EMPTY, stroke_width=(wide + 3) * thin) + svg.element(
+        way = svg.format_lines([at])
+        return svg.format_element("path", d=way, stroke=svg.EMPTY, stroke_width=(wide + 3) * thin) + svg.format_element(
             "path", d=way, stroke=colour, stroke_width=wide * thin, stroke_linecap="round"
         )
     fill = svg.MOTOR if mark.role == MOTOR else svg.EMPTY
     if mark.kind == "sleeve":
-        way = svg.lines([at])
-        return svg.element("path", d=way, stroke=svg.INK, stroke_width=13 * thin) + svg.element(
+        way = svg.format_lines([at])
+        return svg.format_element("path", d=way, stroke=svg.INK, stroke_width=13 * thin) + svg.format_element(
             "path", d=way, stroke=fill, stroke_width=10 * thin
         )
     (x, y), radius = at[0], (5.5 if mark.role == MOTOR else 3.6) * thin
-    return svg.element("circle", cx=x, cy=y, r=radius, fill=fill, stroke=svg.INK, stroke_width=1.4 * thin)
+    return svg.format_element("circle", cx=x, cy=y, r=radius, fill=fill, stroke=svg.INK, stroke_width=1.4 * thin)

@@ -13,9 +13,9 @@ from ..kinematics.platform_motion import PlatformMotion
 from ..mechanism.pose import Grid
 from . import plots
 from .figure_format import Paper
-from .plots import MapPlane, cell_edges, panels, round_ticks, tick_values, tick_words
+from .plots import MapPlane, compute_cell_edges, convert_to_ticks, format_ticks, make_panels, round_ticks
 
-COLUMNS = 4
+POSE_MAP_COLUMNS_MAX = 4
 """Maps beside each other at most."""
 SIDE, SMALL = 5.4, 3.4
 """Width (inches) of a map of a plane, and of one of a box."""
@@ -45,10 +45,10 @@ class PoseMap:
         name, values = (*grid.axes, ("", np.zeros(1)))[2]
         count = len(values) if name else quantities
         side, least = (SMALL, LEAST_SMALL) if name else (SIDE, LEAST_SIDE)
-        columns = paper.columns(min(count, COLUMNS), least)
+        columns = paper.columns(min(count, POSE_MAP_COLUMNS_MAX), least)
         each = -(-count // columns)
         rows, bars = (quantities * each, 1) if name else (each, columns)
-        figure, axes = panels(
+        figure, axes = make_panels(
             rows,
             columns,
             side * columns + BAR * bars,
@@ -61,10 +61,10 @@ class PoseMap:
         for row in table:
             for k, place in enumerate(row):
                 place.set_visible(k < count)
-                plane.finish(place, cell_edges(plane.x), cell_edges(plane.y))
+                plane.finish(place, compute_cell_edges(plane.x), compute_cell_edges(plane.y))
                 if name and k < count:
-                    plots.outer(place, k, columns, count)
-                    plots.layer_title(place, name, tick_values(name, values)[k])
+                    plots.remove_inner_labels(place, k, columns, count)
+                    plots.draw_layer_title(place, name, convert_to_ticks(name, values)[k])
         maps = table[:, :count] if name else table[0, :count, None]
         return cls(figure, plane, tuple(map(tuple, maps)), tuple(map(float, values)) if name else (None,))
 
@@ -85,5 +85,5 @@ class PoseMap:
             extend=extend,
             shrink=0.9,
         )
-        bar.set_ticks(list(ticks), labels=tick_words(ticks))
+        bar.set_ticks(list(ticks), labels=format_ticks(ticks))
         bar.minorticks_off()

@@ -16,7 +16,7 @@ from ..errors import BadRequest, MissingExtra
 from ..options import require_range
 from ..results import Result, with_spelling
 from ..version import __version__
-from .outputs import FIGURES, OUTPUTS, File, function, outputs_of
+from .outputs import FIGURES, OUTPUTS, File, get_outputs, load_function
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -58,7 +58,7 @@ class Picture:
         """
         from ..description.files import write_whole
 
-        ending = _ending(file, self.endings)
+        ending = _require_ending(file, self.endings)
         write_whole(file, self.content if ending == f".{self.kind}" else self.draws(ending))
 
 
@@ -80,17 +80,17 @@ def text(result: Result) -> str:
     >>> print(hrsynth.text(hrsynth.legs("rrrrr_m1")).splitlines()[0])
     rrrrr_m1   R*RRRR*   2 dof
     """
-    shown: str = function(outputs_of(result.shown_as).text)(result)
+    shown: str = load_function(get_outputs(result.shown_as).text)(result)
     return shown
 
 
-def record(command: str, robot: Mechanism | None, fields: dict[str, Any]) -> str:
+def format_record(command: str, robot: Mechanism | None, fields: dict[str, Any]) -> str:
     """Return the JSON text of a command: one object with ``command`` and ``version``, and the name and platform of the
     ``robot`` if it concerns one (no NaN, no infinity)."""
     head: dict[str, Any] = {}
     if robot is not None:
         chosen = None if robot.choice is None else {"chosen": robot.choice.chosen, "reason": robot.choice.reason}
-        link = None if robot.open_platform else robot.platform
+        link = None if robot.has_open_platform else robot.platform
         head = {"robot": robot.name, "platform": {"link": link, **(chosen or {})}}
     text = io.StringIO()  # json.dumps keeps all small pieces of the text at once
     json.dump(
@@ -121,10 +121,10 @@ def html(result: Result) -> str:
     >>> hrsynth.html(hrsynth.derive("3rrr_m1"))[:4]
     '<pre'
     """
-    said, inline = text(result), outputs_of(result.shown_as).inline
+    said, inline = text(result), get_outputs(result.shown_as).inline
     if inline is not None:
         try:
-            return str(function(inline)(result))
+            return str(load_function(inline)(result))
         except MissingExtra as error:
             said = f"{said}\n\n{error}"
     shown = re.sub("(.)\u0332", r"<u>\1</u>", markup.escape(name_steering(said)))
@@ -177,7 +177,7 @@ def draw(
     asked = {"plane": plane, "steps": steps, "seed": 0, "width": width, "font": font}
     if not isinstance(result, Result):
         raise BadRequest("draw: not a result", repr(result), remedy="Give the result of a function of hrsynth.")
-    for drawn in outputs_of(result.shown_as).files:
+    for drawn in get_outputs(result.shown_as).files:
         endings = tuple(each for each in PICTURES if each in drawn.makers)
         if not endings or (drawn.part is not None and getattr(result, drawn.part) is None):
             continue
@@ -185,8 +185,8 @@ def draw(
             raise BadRequest("plane: not for this result", type(result).__name__, "result of singularities")
         if not drawn.drawn and (width is not None or font is not None):
             raise BadRequest("width, font: not for this result", type(result).__name__, remedy="Omit them.")
-        draws = partial(_content, drawn, result, asked)
-        ending = endings[0] if file is None else _ending(file, endings)
+        draws = partial(_render_content, drawn, result, asked)
+        ending = endings[0] if file is None else _require_ending(file, endings)
         picture = Picture(draws(ending), result.headline(), ending[1:], draws, endings)
         if file is not None:
             picture.save(file)
@@ -203,17 +203,17 @@ def draw(
     )
 
 
-def _ending(file: str | Path, endings: tuple[str, ...]) -> str:
+def _require_ending(file: str | Path, endings: tuple[str, ...]) -> str:
     """Return the suffix of a file for a figure; raise ``BadRequest`` if it is unknown."""
-    from ..description.files import as_path, require_writable
+    from ..description.files import convert_to_path, require_writable
 
-    ending = as_path(file).suffix.lower()
+    ending = convert_to_path(file).suffix.lower()
     if ending not in endings:
         raise BadRequest("cannot write the figure: unknown extension", str(file), endings)
     require_writable(file)
     return ending
 
 
-def _content(drawn: File, result: Result, asked: dict[str, Any], ending: str) -> bytes:
+def _render_content(drawn: File, result: Result, asked: dict[str, Any], ending: str) -> bytes:
     content, _ = drawn.content(result, ending, asked)
     return b"".join([content] if isinstance(content, bytes) else content)

@@ -9,26 +9,26 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.freedoms import point_text
-from ..geometry.vectors import Array, perpendicular
+from ..analysis.freedoms import format_point
+from ..geometry.vectors import Array, find_perpendicular
 from ..results import Value
-from ..tolerances import SAME_DIRECTION
+from ..tolerances import DIRECTION_SINE_TOL
 
 
-def axis_label(name: str) -> str:
+def label_axis(name: str) -> str:
     """Return the label of the axis of a pose coordinate."""
     return "φ (degrees)" if name == "phi" else f"{name} (m)"
 
 
-MARGIN = 0.06
+SKETCH_MARGIN_FRACTION = 0.06
 """Space about what is drawn, over its extent."""
-APART = 0.15
+DISTINCT_POINTS_FRACTION = 0.15
 """Distance on the page, over the extent of what is drawn, beyond which two points are clearly distinct."""
-OPEN = 0.35
+CURVE_WIDTH_MIN_FRACTION = 0.35
 """Part of its width that a curve may keep on the page to be seen well."""
-WIRES = 12
+SURFACE_LINES_COUNT = 12
 """Lines drawn on a surface each way."""
-LABELS = 0.42
+SPACE_LABEL_INCHES_MIN = 0.42
 """Room for scales and their names about axes in space (inches)."""
 NAME_ON_AXIS, NUMBER_ON_AXIS, NAME_GAP = -21.0, -8.0, 3.0
 """The pads with which matplotlib writes a name, and numbers, on an axis in space; the room between both (points)."""
@@ -53,16 +53,16 @@ class Sketch(Value):
         """In the plane with this ``normal``, or in space from where the points ``spots`` (n, 3) are seen well apart and
         ``curves`` not from their edge or end."""
         if normal is None:
-            return cls(np.eye(3), ("x", "y", "z"), _view(spots, curves))
-        flat = [i for i in range(3) if abs(float(normal[i])) < SAME_DIRECTION]
+            return cls(np.eye(3), ("x", "y", "z"), _choose_view(spots, curves))
+        flat = [i for i in range(3) if abs(float(normal[i])) < DIRECTION_SINE_TOL]
         if len(flat) == 2:
             return cls(np.eye(3)[flat], tuple("xyz"[i] for i in flat))
-        first = perpendicular(normal, (1.0, 0.0, 0.0))
+        first = find_perpendicular(normal, (1.0, 0.0, 0.0))
         axes = np.array([first, np.cross(normal, first)])
-        return cls(axes, tuple(f"along {point_text(axis)}" for axis in axes))
+        return cls(axes, tuple(f"along {format_point(axis)}" for axis in axes))
 
     @property
-    def flat(self) -> bool:
+    def is_flat(self) -> bool:
         """Return True if everything is in a plane."""
         return len(self.axes) == 2
 
@@ -72,8 +72,8 @@ class Sketch(Value):
 
         seen = extent @ self.axes.T
         low, high = seen.min(axis=0), seen.max(axis=0)
-        margin = MARGIN * float(np.max(high - low))
-        if self.flat:
+        margin = SKETCH_MARGIN_FRACTION * float(np.max(high - low))
+        if self.is_flat:
             place = figure.add_axes(box, aspect="equal")
             half = np.full(2, float(np.max(high - low)) / 2 + margin)
             limits = np.column_stack([(low + high) / 2 - half, (low + high) / 2 + half])
@@ -89,12 +89,14 @@ class Sketch(Value):
                 axis.set_major_locator(MaxNLocator(4, prune="both"))
         for name, ends, words in zip("xyz", limits, self.names, strict=False):
             getattr(place, f"set_{name}lim")(*ends)
-            getattr(place, f"set_{name}label")(axis_label(words))
+            getattr(place, f"set_{name}label")(label_axis(words))
         if bare:
             place.set_axis_off()
-        if not self.flat:
-            self._fill(place, extent if bare else np.array(list(product(*limits))), 0.0 if bare else LABELS)
-        if not (self.flat or bare):
+        if not self.is_flat:
+            self._fill(
+                place, extent if bare else np.array(list(product(*limits))), 0.0 if bare else SPACE_LABEL_INCHES_MIN
+            )
+        if not (self.is_flat or bare):
             _name_axes(place)
         return place
 
@@ -122,7 +124,7 @@ class Sketch(Value):
 
     def surface(self, place: Any, points: Array, colour: str) -> None:
         """A translucent surface (m, n, 3) with some of its own lines; in a plane the lines alone."""
-        if not self.flat:
+        if not self.is_flat:
             place.plot_surface(
                 *np.moveaxis(points, -1, 0),
                 rcount=points.shape[0],
@@ -135,7 +137,7 @@ class Sketch(Value):
                 zorder=1,
             )
         for across in (points, points.swapaxes(0, 1)):
-            for k in np.unique(np.linspace(0, len(across) - 1, WIRES).astype(int)):
+            for k in np.unique(np.linspace(0, len(across) - 1, SURFACE_LINES_COUNT).astype(int)):
                 self.stroke(place, across[k], color=colour, linewidth=0.6, alpha=0.55, zorder=2)
 
     def numbers(
@@ -144,8 +146,8 @@ class Sketch(Value):
         """Texts beside points (n, 3), each on the side where least is in the way: points, texts, polylines."""
         from matplotlib.patheffects import withStroke
 
-        at, near = self._on_page(place, spots), self._on_page(place, np.vstack([*map(_dense, lines), spots]))
-        for each, text, colour, where in zip(at, texts, colours, _beside(at, near), strict=True):
+        at, near = self._on_page(place, spots), self._on_page(place, np.vstack([*map(_refine_polyline, lines), spots]))
+        for each, text, colour, where in zip(at, texts, colours, _place_beside(at, near), strict=True):
             place.annotate(
                 text,
                 each[2:],
@@ -162,7 +164,7 @@ class Sketch(Value):
 
     def _on_page(self, place: Any, points: Array) -> Array:
         """Points (n, 3) as (n, 4): where they are on the page (points), and what ``annotate`` takes."""
-        if self.flat:
+        if self.is_flat:
             data = points @ self.axes.T
         else:
             seen = np.column_stack([points, np.ones(len(points))]) @ place.get_proj().T
@@ -179,7 +181,7 @@ def _name_axes(place: Any) -> None:
         for axis in axes:
             axis.labelpad = pad
         place.figure.draw_without_rendering()
-        middles.append([_middle(axis.label) for axis in axes])
+        middles.append([_locate_middle(axis.label) for axis in axes])
     for axis, at, there in zip(axes, *middles, strict=True):
         away = (there - at) / -NAME_ON_AXIS
         ticks = axis.get_major_ticks()
@@ -190,11 +192,11 @@ def _name_axes(place: Any) -> None:
         axis.labelpad = NAME_ON_AXIS - NUMBER_ON_AXIS + ticks[0].get_pad() + clear
 
 
-def _middle(text: Any) -> Array:
+def _locate_middle(text: Any) -> Array:
     return np.asarray(text.get_window_extent().corners().mean(axis=0))
 
 
-def _beside(at: Array, curves: Array) -> Iterator[tuple[float, float]]:
+def _place_beside(at: Array, curves: Array) -> Iterator[tuple[float, float]]:
     """An offset (points) for the text of each of the places ``at``."""
     taken = [*at[:, :2]]
     turns = np.radians(np.arange(0, 360, 30) + 45.0)
@@ -215,30 +217,38 @@ def _beside(at: Array, curves: Array) -> Iterator[tuple[float, float]]:
         yield float(best[0]), float(best[1])
 
 
-def _dense(line: Array) -> Array:
+def _refine_polyline(line: Array) -> Array:
     """A polyline (n, 3) with places between its corners, some two hundred in all."""
     parts = np.linspace(0.0, 1.0, max(2, 200 // len(line)))[:, None, None]
     return np.asarray(((1 - parts) * line[:-1] + parts * line[1:]).reshape(-1, 3))
 
 
-def _view(spots: Array, curves: Sequence[Array]) -> tuple[float, float]:
+def _choose_view(spots: Array, curves: Sequence[Array]) -> tuple[float, float]:
     """The elevation and azimuth nearest to the usual ones from which points (n, 3) are well apart on the page, and
     curves open."""
     size = float(np.max(np.ptp(spots, axis=0), initial=0.0)) or 1.0
     shapes = [(curve - curve.mean(axis=0), *_spread(curve - curve.mean(axis=0))) for curve in curves]
 
     def worth(view: tuple[float, float]) -> float:
-        page = seen_along(view)[:2].T
-        least = min((float(np.linalg.norm(a - b)) for a, b in combinations(spots @ page / size, 2)), default=APART)
-        closed = min(
-            (float(np.linalg.svd(v @ page, compute_uv=False)[k]) / spread for v, k, spread in shapes), default=OPEN
+        page = compute_view_axes(view)[:2].T
+        least = min(
+            (float(np.linalg.norm(a - b)) for a, b in combinations(spots @ page / size, 2)),
+            default=DISTINCT_POINTS_FRACTION,
         )
-        return min(least, APART) + 0.5 * min(closed, OPEN) - 1e-4 * (abs(view[0] - 22.0) + abs(view[1] + 55.0))
+        closed = min(
+            (float(np.linalg.svd(v @ page, compute_uv=False)[k]) / spread for v, k, spread in shapes),
+            default=CURVE_WIDTH_MIN_FRACTION,
+        )
+        return (
+            min(least, DISTINCT_POINTS_FRACTION)
+            + 0.5 * min(closed, CURVE_WIDTH_MIN_FRACTION)
+            - 1e-4 * (abs(view[0] - 22.0) + abs(view[1] + 55.0))
+        )
 
     return max(product((22.0, 15.0, 30.0, 38.0), np.arange(-145.0, 31.0, 10.0).tolist()), key=worth)
 
 
-def seen_along(view: tuple[float, float]) -> Array:
+def compute_view_axes(view: tuple[float, float]) -> Array:
     """Return right, up and towards the viewer (3, 3) by rows, seen from elevation and azimuth (degrees)."""
     up, turn = np.radians(view)
     eye = np.array([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)])

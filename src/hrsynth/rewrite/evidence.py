@@ -8,8 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..geometry.ranks import kernel_basis, random_in
-from ..geometry.vectors import Array, transform, unit
+from ..geometry.ranks import compute_kernel_basis, draw_in_space
+from ..geometry.vectors import Array, normalise_vector, transform
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.pinocchio_model import PinocchioModel
 from ..kinematics.sampling import Samples
@@ -18,9 +18,9 @@ from ..mechanism import Joint, JointType, Mechanism, graphs
 from ..mechanism.cameras import CameraObservation
 from ..mechanism.composites import WordEdge, WordGraph
 from ..mechanism.legs import LegDecomposition
-from ..mechanism.normal import centre_pair
+from ..mechanism.normal import locate_centre_pair
 from ..mechanism.observations.direction import SeenAxis
-from ..tolerances import LOCUS, SOLVED
+from ..tolerances import CLOSURE_SOLVER_TOL, LOCUS_EXTENT_TOL
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,11 +37,11 @@ class LinearLocus:
         return self.axes[2]
 
 
-def locus(points: Array, scale: float) -> LinearLocus:
+def fit_linear_locus(points: Array, scale: float) -> LinearLocus:
     """The smallest flat that holds all points, shape (n, 3); ``scale`` is what no extent is relative to."""
     centred = points - points.mean(axis=0)
     _, s, Vt = np.linalg.svd(centred / np.sqrt(len(points)), full_matrices=True)
-    return LinearLocus(int(np.sum(s > LOCUS * scale)), Vt)
+    return LinearLocus(int(np.sum(s > LOCUS_EXTENT_TOL * scale)), Vt)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,23 +64,23 @@ class ProximalChain:
     @cached_property
     def anchor_locus(self) -> LinearLocus:
         """Linear locus of A."""
-        return locus(self.anchors, self.length)
+        return fit_linear_locus(self.anchors, self.length)
 
     @cached_property
-    def translates(self) -> bool:
+    def is_translating(self) -> bool:
         """Return True if the link before K only translates relative to the reference link."""
-        return bool(np.max(np.abs(self.rotations - np.eye(3))) < LOCUS)
+        return bool(np.max(np.abs(self.rotations - np.eye(3))) < LOCUS_EXTENT_TOL)
 
-    def keeps(self, direction: Array) -> bool:
+    def has_constant_direction(self, direction: Array) -> bool:
         """Return True if a direction fixed in the link before K is constant in the reference link."""
-        return bool(np.max(np.abs(self.rotations @ direction - direction)) < LOCUS)
+        return bool(np.max(np.abs(self.rotations @ direction - direction)) < LOCUS_EXTENT_TOL)
 
     @cached_property
     def turning_axis(self) -> Array | None:
         """Constant direction about which the link before K rotates, or None."""
         spread = np.concatenate([R - np.eye(3) for R in self.rotations])
         _, s, Vt = np.linalg.svd(spread)
-        if s[0] < LOCUS or s[2] > LOCUS * len(self.rotations):
+        if s[0] < LOCUS_EXTENT_TOL or s[2] > LOCUS_EXTENT_TOL * len(self.rotations):
             return None
         return Vt[2]
 
@@ -117,7 +117,7 @@ class Evidence:
         units = np.broadcast_to(seen.dimension, seen.size)
         pointing = seen.pointing(values * self.samples.model.length**units)
         home = self.mechanism.links[seen.seen_from or self.reference].pose @ seen.view
-        return None if pointing is None else home[:3, :3] @ far_from(pointing)
+        return None if pointing is None else home[:3, :3] @ choose_far_direction(pointing)
 
     def can_spin(self, link: str, direction: Array) -> bool:
         """Return True if a link can rotate about its direction while every other link is fixed.
@@ -126,14 +126,14 @@ class Evidence:
         """
         companions = {link}
         for joint in self.mechanism.joints_of(link):
-            if joint.type is JointType.PRISMATIC and np.linalg.norm(np.cross(joint.axis, direction)) < LOCUS:
+            if joint.type is JointType.PRISMATIC and np.linalg.norm(np.cross(joint.axis, direction)) < LOCUS_EXTENT_TOL:
                 companions.add(joint.other(link))
         if companions & {self.mechanism.base, self.mechanism.platform, self.reference}:
             return False
         at = self.samples.members[0].configuration
         kernel, _ = at.kernel()
         rest = [at.velocity(name) @ kernel for name in self.mechanism.links if name not in companions]
-        still, _ = kernel_basis(np.vstack(rest), 1.0)
+        still, _ = compute_kernel_basis(np.vstack(rest), 1.0)
         if still.shape[1] == 0:
             return False
         moves = at.velocity(link) @ kernel @ still
@@ -156,7 +156,7 @@ class Evidence:
         mechanism, leg = self.mechanism, self.anatomy.leg_of(link)
         if leg is None or self.reference not in (mechanism.base, mechanism.platform) or link == self.reference:
             return []
-        near = graphs.component(mechanism.adjacency, self.reference, {*leg.links} - {link})
+        near = graphs.find_component(mechanism.adjacency, self.reference, {*leg.links} - {link})
         return [j for j in mechanism.joints_of(link) if j.other(link) in near and j.type is not JointType.FREE]
 
     def carrier(self, link: str) -> str:
@@ -192,13 +192,13 @@ class Evidence:
         K, before = found[0], found[0].other(link)
         onward = [j for j in self.mechanism.joints_of(link) if j.name != K.name]
         anchor = K.point
-        if onward and not onward[0].type.slides:
-            anchor = centre_pair(K, onward[0])[0]
+        if onward and not onward[0].type.has_translation:
+            anchor = locate_centre_pair(K, onward[0])[0]
         leg = self.anatomy.leg_of(link)
         assert leg is not None
         nodes = {self.reference}
         if before != self.reference:
-            for path in graphs.paths(self.mechanism.adjacency, self.reference, before, {*leg.links} - {link}):
+            for path in graphs.list_paths(self.mechanism.adjacency, self.reference, before, {*leg.links} - {link}):
                 nodes.update(path)
         joints = tuple(j for j in self.mechanism.joints.values() if set(j.links) <= nodes)
         rotations, anchors = _move_at_random(self.mechanism, self.reference, nodes, joints, before, anchor)
@@ -226,14 +226,14 @@ def _move_at_random(
         else:
             for _ in range(4):
                 kernel, _ = ClosedConfiguration.of(model, q).kernel()
-                q, _ = solve(model, model.integrate(q, 0.12 * random_in(kernel, rng)), tolerance=SOLVED)
+                q, _ = solve(model, model.integrate(q, 0.12 * draw_in_space(kernel, rng)), tolerance=CLOSURE_SOLVER_TOL)
         X = model.pose(q, before)
         rotations.append(X[:3, :3] @ home[:3, :3].T)
         anchors.append(transform(X, local))
     return np.asarray(rotations), np.asarray(anchors)
 
 
-def far_from(directions: Array) -> Array:
+def choose_far_direction(directions: Array) -> Array:
     """A unit vector as far as possible from all given unit vectors (n, 3): the smallest axis of their scatter."""
     _, vectors = np.linalg.eigh(directions.T @ directions)
-    return unit(vectors[:, 0])
+    return normalise_vector(vectors[:, 0])

@@ -66,12 +66,12 @@ class Proposal:
     bodies: tuple[str, ...] = ()
 
 
-def each_chain(state: State, leg: str) -> Sequence[VirtualChain]:
+def list_chain_places(state: State, leg: str) -> Sequence[VirtualChain]:
     """The places of a rule about virtual chains: those of the leg."""
     return state.chain(leg)
 
 
-def whole_leg(state: State, leg: str) -> Sequence[str]:
+def list_leg_place(state: State, leg: str) -> Sequence[str]:
     """The only place of a rule about a leg, or about the robot (then ``leg`` is empty)."""
     return (leg,)
 

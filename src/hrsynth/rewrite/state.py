@@ -117,10 +117,10 @@ class State(Value):
                 if link in leg.links:
                     own = {mechanism.base, leg.platform_link, *leg.links}
                     legs[number] = replace(leg, links=(*leg.links, *chain.links), joints=(*leg.joints, *chain.joints))
-                    return _relink(mechanism, chain, own)
+                    return _move_ends_to_base(mechanism, chain, own)
         attach = chain.reference if chain.link == mechanism.base else chain.link
         legs.append(Leg(chain.leg, chain.links, chain.joints, attach))
-        return _relink(mechanism, chain, {mechanism.base, attach})
+        return _move_ends_to_base(mechanism, chain, {mechanism.base, attach})
 
     def _joints(self, leg: Leg, links: set[str]) -> list[str]:
         mechanism = self.mechanism
@@ -146,18 +146,18 @@ class State(Value):
         return self.decomposition().architecture()
 
 
-def _relink(mechanism: Mechanism, chain: ObservationChain, known: set[str]) -> Mechanism:
+def _move_ends_to_base(mechanism: Mechanism, chain: ObservationChain, known: set[str]) -> Mechanism:
     """Return the state with the ends of a chain that lie on no known link moved to the base."""
     ends = [(chain.joints[0], chain.reference), (chain.joints[-1], chain.link)]
     joints = {name: mechanism.joints[name].relinked(link, mechanism.base) for name, link in ends if link not in known}
     return mechanism.changed(joints=joints.values()) if joints else mechanism
 
 
-def towards(joint: Joint, before: str) -> Joint:
+def orient_joint(joint: Joint, before: str) -> Joint:
     """The joint with ``before`` as its predecessor."""
     return joint if joint.predecessor == before else joint.turned()
 
 
-def ball_to_universal(joint: Joint, before: str, axes: tuple[Array, Array]) -> Joint:
+def convert_ball_to_universal(joint: Joint, before: str, axes: tuple[Array, Array]) -> Joint:
     """An S made a U whose first axis is fixed in ``before``."""
-    return replace(towards(joint, before), type=JointType.UNIVERSAL, axes=axes, wrist=None)
+    return replace(orient_joint(joint, before), type=JointType.UNIVERSAL, axes=axes, wrist=None)

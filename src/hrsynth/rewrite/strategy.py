@@ -13,15 +13,15 @@ from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Protocol
 
 from ..mechanism import Mechanism
-from ..mechanism.observation import labels_of
+from ..mechanism.observation import list_labels
 from ..progress import report
 from ..records import ANGLE, Record, Recorded
 from .evidence import Evidence
 from .rule import Proposal, Refusal, Rule, Stage
-from .rules import rules
+from .rules import list_rules
 from .state import State
 
-BUDGET = 400
+REWRITE_PROPOSALS_MAX = 400
 """The largest number of proposals a derivation may try."""
 
 
@@ -68,7 +68,7 @@ class Step(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class Rewriting:
+class RewriteTrace:
     """State of a derivation and its steps. With ``check`` None every proposal is accepted and side conditions are
     waived. Proposals of ``unchecked`` stages are accepted where their side conditions hold: a later check compares the
     whole."""
@@ -82,19 +82,19 @@ class Rewriting:
     """Number of checked proposals."""
 
     @classmethod
-    def of(cls, evidence: Evidence, check: Check | None = None, unchecked: Iterable[Stage] = ()) -> Rewriting:
+    def of(cls, evidence: Evidence, check: Check | None = None, unchecked: Iterable[Stage] = ()) -> RewriteTrace:
         """The real robot, before any rule."""
         real = evidence.anatomy
         return cls(State(real, replace(real.mechanism, observations=())), evidence, check, frozenset(unchecked))
 
     @property
-    def virtual_only(self) -> bool:
+    def has_virtual_motors_only(self) -> bool:
         """True if the rules that always hold were accepted and the virtual actuators are the only motors: every
         observed leg then has one, or a constant direction."""
-        driven = {joint.name for joint in self.state.mechanism.joints.values() if joint.actuated}
+        driven = {joint.name for joint in self.state.mechanism.joints.values() if joint.is_actuated}
         return all(step.accepted for step in self.steps if step.always) and driven == self.state.actuators
 
-    def attempt(self, rule: Rule[Any, Any], leg: str | None) -> Rewriting:
+    def attempt(self, rule: Rule[Any, Any], leg: str | None) -> RewriteTrace:
         """The first of a rule's proposals that is accepted, if one is."""
         at = self
         for proposal in rule.proposals(at.state, at.evidence, leg or "", waive=at.check is None):
@@ -103,14 +103,14 @@ class Rewriting:
                 break
         return at
 
-    def judged(self, rule: Rule[Any, Any], leg: str | None, proposal: Proposal | Refusal) -> Rewriting:
+    def judged(self, rule: Rule[Any, Any], leg: str | None, proposal: Proposal | Refusal) -> RewriteTrace:
         """After the check of one proposal: its state where that passes."""
         if isinstance(proposal, Refusal):
             return self._after(rule, leg, False, proposal.reason)
         report(f"{rule.name} {leg or ''}")
         if self.check is None or rule.stage in self.unchecked:
             return self._after(rule, leg, True, proposal.reason, None, proposal)
-        if self.tried >= BUDGET:
+        if self.tried >= REWRITE_PROPOSALS_MAX:
             return self._after(rule, leg, False, "the limit of attempts is reached")
         found = self.check(proposal.state.mechanism, proposal.bodies)
         reason = proposal.reason if found.passed else f"{proposal.reason}: refused, {found.reason}"
@@ -125,20 +125,20 @@ class Rewriting:
         reason: str,
         angle: float | None = None,
         proposal: Proposal | None = None,
-    ) -> Rewriting:
+    ) -> RewriteTrace:
         state, bodies = (proposal.state, proposal.bodies) if accepted and proposal else (None, ())
         step = Step(rule.name, leg, accepted, reason, angle, state, rule.always, rule.keeps, bodies)
         return replace(self, state=state or self.state, steps=(*self.steps, step))
 
 
-Strategy = Callable[[Rewriting], Rewriting]
+Strategy = Callable[[RewriteTrace], RewriteTrace]
 """Function that continues a rewriting."""
 
 
-def chain(*strategies: Strategy) -> Strategy:
+def run_in_order(*strategies: Strategy) -> Strategy:
     """Run one strategy after the other."""
 
-    def run(at: Rewriting) -> Rewriting:
+    def run(at: RewriteTrace) -> RewriteTrace:
         for strategy in strategies:
             at = strategy(at)
         return at
@@ -146,12 +146,12 @@ def chain(*strategies: Strategy) -> Strategy:
     return run
 
 
-def each_leg(legs: Callable[[Rewriting], Iterable[str]], *stages: Stage) -> Strategy:
+def apply_to_each_leg(legs: Callable[[RewriteTrace], Iterable[str]], *stages: Stage) -> Strategy:
     """The rules of some stages, each on all legs that have a place for it."""
 
-    def run(at: Rewriting) -> Rewriting:
+    def run(at: RewriteTrace) -> RewriteTrace:
         wanted = list(legs(at))
-        for rule in rules(*stages):
+        for rule in list_rules(*stages):
             for leg in wanted:
                 if rule.places(at.state, leg):
                     at = at.attempt(rule, leg)
@@ -160,24 +160,24 @@ def each_leg(legs: Callable[[Rewriting], Iterable[str]], *stages: Stage) -> Stra
     return run
 
 
-def whole_robot(stage: Stage) -> Strategy:
+def apply_to_robot(stage: Stage) -> Strategy:
     """The rules of a stage, each on the robot as a whole."""
 
-    def run(at: Rewriting) -> Rewriting:
-        for rule in rules(stage):
+    def run(at: RewriteTrace) -> RewriteTrace:
+        for rule in list_rules(stage):
             at = at.attempt(rule, None)
         return at
 
     return run
 
 
-def choose_fewest_legs(stage: Stage, after: Strategy, left: Callable[[Rewriting], Iterable[str]]) -> Strategy:
+def choose_fewest_legs(stage: Stage, after: Strategy, left: Callable[[RewriteTrace], Iterable[str]]) -> Strategy:
     """Take the proposal of a stage's rules from which another strategy leaves the fewest legs; none if none leaves
     fewer than before. The first that leaves no leg ends the search; the others are marked as discarded."""
 
-    def run(start: Rewriting) -> Rewriting:
+    def run(start: RewriteTrace) -> RewriteTrace:
         least, found, trace, tried = len(list(left(start))), start, start.steps, start.tried
-        for rule in rules(stage):
+        for rule in list_rules(stage):
             for proposal in rule.proposals(start.state, start.evidence) if least else ():
                 trial = replace(start, steps=(), tried=tried).judged(rule, None, proposal)
                 accepted = trial.state is not start.state
@@ -187,31 +187,33 @@ def choose_fewest_legs(stage: Stage, after: Strategy, left: Callable[[Rewriting]
                     least, found = rest, trial
                 if accepted and not rest:
                     break
-                trace += tuple(_taken_back(step) for step in trial.steps) if accepted else trial.steps
+                trace += tuple(_discard_step(step) for step in trial.steps) if accepted else trial.steps
         return replace(found, steps=trace if found is start else trace + found.steps, tried=tried)
 
     return run
 
 
-def _taken_back(step: Step) -> Step:
+def _discard_step(step: Step) -> Step:
     return replace(step, accepted=False, reason=f"{step.reason} (discarded: legs remain)", state=None, discarded=True)
 
 
-def observed_legs(at: Rewriting) -> tuple[str, ...]:
+def list_observed_legs(at: RewriteTrace) -> tuple[str, ...]:
     """The legs that are observed."""
-    return labels_of(at.evidence.samples.observation_model.observations)
+    return list_labels(at.evidence.samples.observation_model.observations)
 
 
-def unobserved_legs(at: Rewriting) -> tuple[str, ...]:
+def list_unobserved_legs(at: RewriteTrace) -> tuple[str, ...]:
     """The legs that have no virtual chain and have not gone."""
     known = {*at.state.observed_labels(), *at.state.removed}
     return tuple(label for label in at.state.real.labels if label not in known)
 
 
-def keep_unobserved(at: Rewriting) -> Rewriting:
+def keep_unobserved(at: RewriteTrace) -> RewriteTrace:
     """Record why the remaining legs stay."""
     reason = "without the leg the velocity relation changes: it stays, passive"
-    return replace(at, steps=at.steps + tuple(Step("keep", leg, True, reason, None) for leg in unobserved_legs(at)))
+    return replace(
+        at, steps=at.steps + tuple(Step("keep", leg, True, reason, None) for leg in list_unobserved_legs(at))
+    )
 
 
 def require_informative_leg(strategy: Strategy) -> Strategy:
@@ -222,19 +224,23 @@ def require_informative_leg(strategy: Strategy) -> Strategy:
 OBSERVED_STAGES = frozenset(Stage) - {Stage.LEG, Stage.ENDS}
 """Stages of the observed legs: with a complete hidden robot, the velocity relation of all steps together decides."""
 
-LIFTED = chain(whole_robot(Stage.MOTORS), each_leg(observed_legs, Stage.LIFT))
+LIFTED = run_in_order(apply_to_robot(Stage.MOTORS), apply_to_each_leg(list_observed_legs, Stage.LIFT))
 """The exact lift, of which the relation is that of the real robot for every robot."""
 
-GENERAL = chain(LIFTED, each_leg(observed_legs, Stage.DIRECTION, Stage.ANCHOR, Stage.JOINT, Stage.BESIDE))
+GENERAL = run_in_order(
+    LIFTED, apply_to_each_leg(list_observed_legs, Stage.DIRECTION, Stage.ANCHOR, Stage.JOINT, Stage.BESIDE)
+)
 """The general form: sliders under every virtual actuator, all legs kept."""
 
-DROPPED = each_leg(unobserved_legs, Stage.LEG)
+DROPPED = apply_to_each_leg(list_unobserved_legs, Stage.LEG)
 """Removal of unobserved legs, each tried."""
 
-SIMPLIFIED = chain(
+SIMPLIFIED = run_in_order(
     GENERAL,
-    each_leg(observed_legs, Stage.FORM),
-    require_informative_leg(chain(DROPPED, choose_fewest_legs(Stage.ENDS, DROPPED, unobserved_legs), keep_unobserved)),
+    apply_to_each_leg(list_observed_legs, Stage.FORM),
+    require_informative_leg(
+        run_in_order(DROPPED, choose_fewest_legs(Stage.ENDS, DROPPED, list_unobserved_legs), keep_unobserved)
+    ),
 )
 """Simplified form, as far as the equivalence check passes: where unobserved legs constrain the platform, the ends of
 the observed legs are changed; legs that still cannot be removed stay."""
@@ -244,12 +250,12 @@ FORMS = {"simplified": SIMPLIFIED, "general": GENERAL}
 """Forms of a hidden robot, by name."""
 
 
-def apply_unchecked(evidence: Evidence, *, change_ends: bool) -> list[Rewriting]:
+def apply_unchecked(evidence: Evidence, *, change_ends: bool) -> list[RewriteTrace]:
     """The forms that the rules give when no condition is checked; with ``change_ends`` one for each choice of outer
     axes besides."""
-    start = chain(GENERAL, each_leg(observed_legs, Stage.FORM))(Rewriting.of(evidence))
+    start = run_in_order(GENERAL, apply_to_each_leg(list_observed_legs, Stage.FORM))(RewriteTrace.of(evidence))
     starts = [start]
-    for rule in rules(Stage.ENDS) if change_ends else ():
+    for rule in list_rules(Stage.ENDS) if change_ends else ():
         starts += [
             start.judged(rule, None, each)
             for each in rule.proposals(start.state, evidence, waive=True)

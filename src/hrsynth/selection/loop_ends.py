@@ -37,7 +37,7 @@ class LoopEnds(Value):
         try:
             found = EquilibriumSearch.of(setup, goal).answer(minima=True, rounds=rounds)
             others = tuple(sorted(each.kind for each in found.stable if each.kind != GOAL and not each.beyond_limits))
-            if not all(each.by_segment for each in setup.observed):
+            if not all(each.is_segment_direction for each in setup.observed):
                 return cls(others, None, "the attraction radius is computed for directions of segments only")
             radius = certified_radius(setup, goal)
         except HrsynthError as error:
@@ -74,7 +74,7 @@ class LoopEnds(Value):
     reason = Shown(str | None, lambda self: self.why or None)
 
 
-def fewer_are_better(
+def explain_smaller_set(
     best: tuple[tuple[str, ...], LoopEnds], others: Iterable[tuple[tuple[str, ...], LoopEnds]]
 ) -> str | None:
     """Explain in a sentence why a set ranks above the largest one that contains it; None if no such set has more stable

@@ -11,8 +11,8 @@ from typing import Annotated, NamedTuple, TypedDict
 
 import numpy as np
 
-from ..analysis.accuracy.accuracy import errors_at
-from ..analysis.accuracy.measurement_bounds import Cones, MeasurementBounds, unseen
+from ..analysis.accuracy.accuracy import compute_errors_at
+from ..analysis.accuracy.measurement_bounds import Cones, MeasurementBounds, find_invisible
 from ..analysis.accuracy.pose_errors import PoseErrors
 from ..analysis.analysis_declaration import analysis
 from ..analysis.aspects.path import PathPlanner
@@ -30,33 +30,33 @@ from ..analysis.observed import (
     SeeLike,
     StartPose,
 )
-from ..analysis.pose_requests import configurations_at
-from ..analysis.verdict import CONTROLLABLE, verdict_of
-from ..budgets import AXIS_SEEN, SELECT_ROUNDS
+from ..analysis.pose_requests import solve_configurations
+from ..analysis.verdict import CONTROLLABLE, compute_verdict
+from ..budgets import SELECT_EQUILIBRIUM_ROUNDS_COUNT, VISIBLE_AXIS_MIN_FRACTION
 from ..errors import BadRequest, HrsynthError
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.limits import outside
-from ..mechanism.observation import labels_of
+from ..kinematics.limits import list_joints_beyond
+from ..mechanism.observation import list_labels
 from ..mechanism.observations.direction import SeenAxis
-from ..mechanism.pose import Pose, PoseLike, asked_pose
-from ..options import option, options_of, require_range
-from ..progress import part, report
+from ..mechanism.pose import Pose, PoseLike, parse_pose
+from ..options import list_options, option, require_range
+from ..progress import report, report_part
 from ..records import DEG, MM, As, Number, Record, Recorded, Shown, Word, recorded
-from ..results import Compared, Result, Value, by_name
+from ..results import ComparableValue, Result, Value, by_name
 from ..simulation.camera import cylinders, place_camera
 from ..simulation.equilibria.equilibria import EquilibriumSearch
 from ..simulation.equilibria.search import starts
 from ..simulation.outcome import GOAL
 from ..simulation.servo import servo
-from .loop_ends import LoopEnds, fewer_are_better
-from .sight import CameraView, camera_at, of_focal
+from .loop_ends import LoopEnds, explain_smaller_set
+from .sight import CameraView, make_camera, parse_camera_pose
 
-BUDGET = 2_000
+SELECT_PATH_INTERVALS_MAX = 2_000
 """Largest number of intervals of a path's certificate."""
 CONE = "0.1deg"
 """Default half-angle of the cones about directions."""
-FOCAL = 800.0
+SELECT_FOCAL_PIXELS_COUNT = 800.0
 """Focal length of the camera (pixels)."""
 AUTO = "auto"
 TYPES = {
@@ -98,13 +98,15 @@ class Criteria:
         ),
     ] = None
     """The pose of a camera on the link that carries it, or ``auto`` for one that sees all legs well."""
-    focal: Annotated[float, option("Focal length of the camera, for images of 640 × 480 pixels.", "PIXELS")] = FOCAL
+    focal: Annotated[float, option("Focal length of the camera, for images of 640 × 480 pixels.", "PIXELS")] = (
+        SELECT_FOCAL_PIXELS_COUNT
+    )
     """Its focal length (pixels)."""
 
     def __post_init__(self) -> None:
-        if self.visible_from is None and self.focal != FOCAL:
+        if self.visible_from is None and self.focal != SELECT_FOCAL_PIXELS_COUNT:
             raise BadRequest(f"--focal {self.focal:g}: there is no camera", remedy="Give its pose with --visible-from.")
-        for each in options_of(Criteria):
+        for each in list_options(Criteria):
             if each.kind is int:
                 require_range(each.name, getattr(self, each.name), "an integer", each.low, each.high)
 
@@ -129,7 +131,7 @@ class ModeCount(Record):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Decision(Compared, all_recorded=True):
+class Decision(ComparableValue, all_recorded=True):
     """Verdict and its reason."""
 
     verdict: str
@@ -189,7 +191,7 @@ class SightRecord(NamedTuple):
     focal: float
 
 
-class Unexamined(TypedDict):
+class UnexaminedSets(TypedDict):
     """Number of sets that were not examined, and the reason."""
 
     count: int
@@ -247,7 +249,7 @@ class Selection(Result, shown_as="select"):
     def fewer(self) -> str | None:
         """Explanation why the best set ranks above one with more legs, None if it does not."""
         known = [(each.legs, each.equilibria) for each in self.kept if each.equilibria is not None]
-        return fewer_are_better(known[0], known[1:]) if known and known[0][0] == self.kept[0].legs else None
+        return explain_smaller_set(known[0], known[1:]) if known and known[0][0] == self.kept[0].legs else None
 
     @property
     @recorded(As("cones"))
@@ -265,7 +267,7 @@ class Selection(Result, shown_as="select"):
 
     noise = Shown(dict[str, float], lambda self: self.bounds.amounts, "by its unit (px, m, rad)")
     best = Shown(list[str] | None, lambda self: self.kept[0].legs if self.kept else None)
-    not_examined = Shown(Unexamined, lambda self: {"count": len(self.unexamined), "reason": self.left})
+    not_examined = Shown(UnexaminedSets, lambda self: {"count": len(self.unexamined), "reason": self.left})
     limits_ignored = Shown(list[str], lambda self: self.setup.limits_ignored, UNLIMITED)
 
 
@@ -327,7 +329,7 @@ def select(
     ------
     BadRequest
         For invalid options.
-    PoseNotReached
+    PoseReachFailure
         If start or goal is not reached.
 
     Notes
@@ -342,9 +344,9 @@ def select(
     >>> hrsynth.select("3rrr_m1", start="x=0,y=0,phi=0", goal="x=0.02,y=0,phi=0")
     <Selection: 3rrr_m1: 7 sets, 1 kept, best 1, 2, 3>
     """
-    wanted = [asked_pose(each) for each in (start, goal)]
+    wanted = [parse_pose(each) for each in (start, goal)]
     setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed).telling(wanted)
-    others = not all(o.by_segment for o in setup.observed)
+    others = not all(o.is_segment_direction for o in setup.observed)
     if others and criteria.visible_from is not None:
         setup.by_segments("select with --visible-from")
     if observe is None and not others:
@@ -353,21 +355,21 @@ def select(
     blur = MeasurementBounds.of(
         CONE if cone is None and directed and (noise is None or not others) else cone, noise, setup.observed
     )
-    ends = configurations_at(setup, wanted)
+    ends = solve_configurations(setup, wanted)
     work = _Work(
         setup,
         ends[0],
         ends[1],
         blur,
-        _sight(setup, ends, criteria),
+        _place_camera(setup, ends, criteria),
         criteria,
         seed,
     )
-    labels = labels_of(setup.observed)
+    labels = list_labels(setup.observed)
     sets = [legs for count in range(1, min(criteria.size, len(labels)) + 1) for legs in combinations(labels, count)]
     looked = []
     for number, legs in enumerate(sets, 1):
-        with part(f"set {number} of {len(sets)}"):
+        with report_part(f"set {number} of {len(sets)}"):
             looked.append(work.first(legs))
     found, left = work.examine(sorted(looked, key=lambda each: each.order))
     found.sort(
@@ -381,15 +383,15 @@ def select(
     return Selection(setup, poses[0], poses[1], tuple(found), blur, work.sight, left)
 
 
-def _sight(setup: ObservedRobot, ends: Sequence[ClosedConfiguration], criteria: Criteria) -> CameraView | None:
+def _place_camera(setup: ObservedRobot, ends: Sequence[ClosedConfiguration], criteria: Criteria) -> CameraView | None:
     if criteria.visible_from is None:
         return None
     rods = cylinders(setup.mechanism, setup.observed)
     reference = setup.mechanism.reference
     camera = (
-        place_camera(rods, reference, [at.pose for at in ends], of_focal(criteria.focal))
+        place_camera(rods, reference, [at.pose for at in ends], make_camera(criteria.focal))
         if criteria.visible_from == AUTO
-        else camera_at(criteria.visible_from, criteria.focal)
+        else parse_camera_pose(criteria.visible_from, criteria.focal)
     )
     return CameraView(camera, reference, {o.leg: rod for o, rod in zip(setup.observed, rods, strict=True)})
 
@@ -415,26 +417,26 @@ class _Work:
         report("accuracy")
         setup = self.watching(legs)
         try:
-            verdict = verdict_of(setup, legs, setup.samples)
+            verdict = compute_verdict(setup, legs, setup.samples)
             if verdict.verdict != CONTROLLABLE:
                 lost = f", not observed: {verdict.named}" if verdict.unobserved else ""
                 return Candidate(legs, verdict.verdict, verdict.verdict + lost)
             analysis = ConfigurationAnalysis.of(setup)
             ends = (("start", self.start), ("goal", self.goal))
-            behind = [(name, unseen(at, setup.samples.observation_model)) for name, at in ends]
+            behind = [(name, find_invisible(at, setup.samples.observation_model)) for name, at in ends]
             reasons = [f"{o.kind} {o.leg} is not in front of its camera at the {name}" for name, o in behind if o]
             if reasons:
                 return Candidate(legs, verdict.verdict, reasons[0])
             reasons = [
                 f"the {name} is beyond the limits of {', '.join(joints)}"
                 for name, at in ends
-                if (joints := outside(at.model, at.q))
+                if (joints := list_joints_beyond(at.model, at.q))
             ]
-            reasons += [reason for name, at in ends if (reason := _singular_at(name, analysis.classify(at)))]
+            reasons += [reason for name, at in ends if (reason := _explain_singularity(name, analysis.classify(at)))]
         except HrsynthError as error:
             return Candidate(legs, "undecided", str(error))
         blur = self.blur.select([i for i, o in enumerate(self.setup.observed) if o.leg in legs])
-        found = Candidate(legs, verdict.verdict, next(iter(reasons), None), errors_at(setup, blur, self.goal))
+        found = Candidate(legs, verdict.verdict, next(iter(reasons), None), compute_errors_at(setup, blur, self.goal))
         return self.look(found, (self.start, self.goal))
 
     def look(self, candidate: Candidate, configurations: Sequence[ClosedConfiguration]) -> Candidate:
@@ -444,7 +446,11 @@ class _Work:
         least = self.sight.least(configurations)
         seen = {leg: least[leg] for leg in candidate.legs}
         worst = min(seen, key=lambda leg: seen[leg])
-        why = None if seen[worst] >= AXIS_SEEN else f"the camera sees {100 * seen[worst]:.0f} % of leg {worst}"
+        why = (
+            None
+            if seen[worst] >= VISIBLE_AXIS_MIN_FRACTION
+            else f"the camera sees {100 * seen[worst]:.0f} % of leg {worst}"
+        )
         return replace(candidate, seen=seen, discarded=why)
 
     def decide(self, candidate: Candidate) -> Candidate:
@@ -456,7 +462,7 @@ class _Work:
         start_modes, goal_modes = self._modes(setup, self.start), self._modes(setup, self.goal)
         report("aspects")
         try:
-            answer = PathPlanner.of(setup).join(self.start, self.goal, seed=self.seed, budget=BUDGET)
+            answer = PathPlanner.of(setup).join(self.start, self.goal, seed=self.seed, budget=SELECT_PATH_INTERVALS_MAX)
             aspect = Decision(answer.verdict, answer.reason)
         except HrsynthError as error:
             aspect = Decision("undecided", str(error))
@@ -491,12 +497,12 @@ class _Work:
                 found.append(replace(candidate, examined=False))
                 continue
             begun += 1
-            with part(f"examined set {begun} of {every}"):
+            with report_part(f"examined set {begun} of {every}"):
                 found.append(self.find_endings(self.decide(candidate), begun))
         for place in sorted(range(len(found)), key=lambda i: found[i].rank):
             candidate = found[place]
             if candidate.examined and not candidate.discarded and arrived < runs:
-                with part(f"run {arrived + 1} of {runs}"):
+                with report_part(f"run {arrived + 1} of {runs}"):
                     found[place] = self.ran(candidate)
                 arrived += found[place].discarded is None
         return found, left
@@ -507,7 +513,7 @@ class _Work:
             return candidate
         report("equilibria")
         setup = self.watching(candidate.legs)
-        rounds = self.rounds if all(o.by_segment for o in self.setup.observed) else self._rounds(setup)
+        rounds = self.rounds if all(o.is_segment_direction for o in self.setup.observed) else self._rounds(setup)
         return replace(candidate, equilibria=LoopEnds.of(setup, self.goal, rounds))
 
     @cached_property
@@ -519,7 +525,7 @@ class _Work:
         """Starts at which all observed points of a setup are in front of their cameras."""
         system = EquilibriumSearch.of(setup, self.goal).system
         homes = np.array([system.system.read(at.pose) for at in (self.goal, *setup.configurations)])
-        return tuple(islice(starts(system, homes, self.seed, setup), SELECT_ROUNDS))
+        return tuple(islice(starts(system, homes, self.seed, setup), SELECT_EQUILIBRIUM_ROUNDS_COUNT))
 
     def ran(self, candidate: Candidate) -> Candidate:
         """Add the outcome of the simulated run, and what the camera sees along it."""
@@ -529,7 +535,7 @@ class _Work:
         try:
             found = (
                 servo(self.setup.robot, candidate.legs, camera, start=start, goal=goal, seed=self.seed)
-                if all(o.by_segment for o in self.setup.observed)
+                if all(o.is_segment_direction for o in self.setup.observed)
                 else servo(self.watching(candidate.legs), start=start, goal=goal, seed=self.seed)
             )
         except HrsynthError as error:
@@ -542,7 +548,7 @@ class _Work:
         return self.look(replace(candidate, run=run), found.run.configurations)
 
 
-def _singular_at(name: str, posture: ConfigurationReport) -> str | None:
+def _explain_singularity(name: str, posture: ConfigurationReport) -> str | None:
     """Return why a set is discarded: its hidden robot is singular at start or goal; None where it is regular."""
     kind = TYPES.get(posture.hidden.state)
     return None if kind is None else f"the {name} is {kind}"

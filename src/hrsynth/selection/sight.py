@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import BadRequest
-from ..geometry.vectors import Array, pose
+from ..geometry.vectors import Array, build_pose
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism.pose import Pose
 from ..results import Value
 from ..simulation.camera import Camera, Cylinder
 
 Flags = NDArray[np.bool_]
-PLACES = 101
+LEG_AXIS_POINTS_COUNT = 101
 """Points of a leg's axis that are looked at."""
 
 
@@ -34,11 +34,11 @@ class CameraView(Value):
         ends = {leg: self.camera.project(X, at.pose, rod) for leg, rod in self.rods.items()}
         found = {}
         for leg, (first, last) in ends.items():
-            points = first + np.linspace(0.0, 1.0, PLACES)[:, None] * (last - first)
+            points = first + np.linspace(0.0, 1.0, LEG_AXIS_POINTS_COUNT)[:, None] * (last - first)
             clear = self._in_picture(points)
             for other, segment in ends.items():
                 if other != leg:
-                    clear &= ~are_hidden(points, segment, self.rods[other].radius)
+                    clear &= ~find_hidden_points(points, segment, self.rods[other].radius)
             found[leg] = float(clear.mean())
         return found
 
@@ -55,7 +55,7 @@ class CameraView(Value):
         return np.asarray(ahead & inside, dtype=bool)
 
 
-def are_hidden(points: Array, segment: Array, radius: float) -> Flags:
+def find_hidden_points(points: Array, segment: Array, radius: float) -> Flags:
     """Mask (n,) of the points (n, 3) that a cylinder about a segment (2, 3) hides from the origin: the ray to the point
     passes the segment nearer than ``radius``, before the point."""
     a, d = segment[0], segment[1] - segment[0]
@@ -74,19 +74,19 @@ def are_hidden(points: Array, segment: Array, radius: float) -> Flags:
     return np.asarray((apart < radius) & before, dtype=bool)
 
 
-def camera_at(text: str, focal: float) -> Camera:
+def parse_camera_pose(text: str, focal: float) -> Camera:
     """Camera at a pose in the frame of the link that carries it: x right, y down, z ahead; 640 by 480 pixels, focal
     length in pixels. Raises ``BadRequest``."""
-    blank = of_focal(focal)
+    blank = make_camera(focal)
     wanted = Pose.parse(text)
     if None in (wanted.x, wanted.y, wanted.z) or wanted.rotation is None:
         raise BadRequest(f"--visible-from {text}: the pose is incomplete", remedy="Give x, y, z and rpy, or auto.")
     return replace(
-        blank, place=pose([float(wanted.x or 0), float(wanted.y or 0), float(wanted.z or 0)], wanted.rotation)
+        blank, place=build_pose([float(wanted.x or 0), float(wanted.y or 0), float(wanted.z or 0)], wanted.rotation)
     )
 
 
-def of_focal(focal: float) -> Camera:
+def make_camera(focal: float) -> Camera:
     """A camera of a focal length in pixels, not placed; raises ``BadRequest``."""
     if not 0 < focal < np.inf:
         raise BadRequest("--focal (pixels)", focal, "a positive number")

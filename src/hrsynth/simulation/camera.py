@@ -13,19 +13,19 @@ from itertools import product
 import numpy as np
 
 from ..errors import BadRequest
-from ..geometry.vectors import Array, inverse, perpendicular, pose, transform, unit
+from ..geometry.vectors import Array, build_pose, find_perpendicular, invert_pose, normalise_vector, transform
 from ..mechanism import Mechanism
 from ..mechanism.observation import Observation
 from ..mechanism.observations.direction import Direction
 from ..results import Value
-from ..tolerances import NUDGE
+from ..tolerances import SLOPE_STEP_MAX
 from .law import Measures, Poses
-from .mujoco_model import RADIUS
+from .mujoco_model import MUJOCO_ROD_RADIUS_FRACTION
 from .noise import NoiseSamples
 
-VIEWS = 200
+CAMERA_PLACES_COUNT = 200
 """Camera positions around the legs that are tried."""
-MARGIN = 0.85
+IMAGE_USABLE_FRACTION = 0.85
 """Fraction of the image, from its centre, in which all legs must lie."""
 SHORTEST, HALF = 0.05, 0.25
 """Rods shorter than this part of the robot's length are drawn with this half-length instead."""
@@ -52,7 +52,7 @@ class Camera(Value):
 
     def project(self, X_reference: Array, poses: Poses, rod: Cylinder) -> Array:
         """Return the ends of a rod in the camera's frame, (2, 3)."""
-        X = inverse(X_reference @ self.place) @ poses(rod.link)
+        X = invert_pose(X_reference @ self.place) @ poses(rod.link)
         return np.asarray(rod.ends @ X[:3, :3].T + X[:3, 3])
 
     def pixels(self, points: Array) -> Array:
@@ -67,7 +67,7 @@ class Camera(Value):
 def edges(ends: Array, radius: float) -> tuple[Array, Array]:
     """Return the unit normals (3,) of the two camera planes tangent to a cylinder whose axis has the ends (2, 3)
     (eqs. 3-4); raises ``BadRequest`` if the camera is inside of it."""
-    u = unit(ends[1] - ends[0])
+    u = normalise_vector(ends[1] - ends[0])
     moment = np.cross(ends[0], u)
     distance = float(np.linalg.norm(moment))
     if distance <= radius:
@@ -85,7 +85,7 @@ def edges(ends: Array, radius: float) -> tuple[Array, Array]:
 
 def rebuilt(first: Array, second: Array) -> Array:
     """Return the direction (3,) of a cylinder from the normals of its two edges (eq. 5); singular if they coincide."""
-    return unit(np.cross(first, second))
+    return normalise_vector(np.cross(first, second))
 
 
 def cylinders(mechanism: Mechanism, observations: Sequence[Observation]) -> tuple[Cylinder, ...]:
@@ -93,14 +93,14 @@ def cylinders(mechanism: Mechanism, observations: Sequence[Observation]) -> tupl
     found = []
     for observation in observations:
         assert isinstance(observation, Direction)
-        X = inverse(mechanism.links[observation.link].pose)
+        X = invert_pose(mechanism.links[observation.link].pose)
         centres = np.array([transform(X, joint.point) for joint in mechanism.joints_of(observation.link)])
         along = (centres - centres[0]) @ observation.direction
         low, high = float(along.min()), float(along.max())
         if high - low < SHORTEST * mechanism.length:
             low, high = -HALF * mechanism.length, HALF * mechanism.length
         ends = centres[0] + np.outer([low, high], observation.direction)
-        found.append(Cylinder(observation.link, ends, RADIUS * mechanism.length))
+        found.append(Cylinder(observation.link, ends, MUJOCO_ROD_RADIUS_FRACTION * mechanism.length))
     return tuple(found)
 
 
@@ -131,13 +131,13 @@ class Edges(Value):
 
 def _move_edge(normal: Array, ends: Array, shift: Array) -> Array:
     """Return the normal of an edge whose image is moved across itself by ``shift`` (two numbers) at the rod's ends."""
-    across = unit(np.array([normal[0], normal[1], 0.0]))
+    across = normalise_vector(np.array([normal[0], normal[1], 0.0]))
     points = []
     for end, by in zip(ends, shift, strict=False):
         image = end / end[2]
         level = image - (normal @ image) / (normal @ across) * across
         points.append(level + by * across)
-    found = unit(np.cross(points[0], points[1]))
+    found = normalise_vector(np.cross(points[0], points[1]))
     return found if found @ normal > 0 else -found
 
 
@@ -148,8 +148,8 @@ def place_camera(
     sphere around the rods it is the one at which pixel errors change the computed directions least."""
     ends = np.array([rods_in_frame(rods, reference, X) for X in poses])
     best, found = np.inf, Camera(np.eye(4))
-    for ahead in _sphere(VIEWS):
-        camera = facing(ends, ahead, perpendicular(ahead), blank)
+    for ahead in _sphere(CAMERA_PLACES_COUNT):
+        camera = facing(ends, ahead, find_perpendicular(ahead), blank)
         local = (ends - camera.place[:3, 3]) @ camera.place[:3, :3]
         score = max(sensitivity(segment, rod.radius) for each in local for segment, rod in zip(each, rods, strict=True))
         if score < best:
@@ -159,7 +159,7 @@ def place_camera(
 
 def rods_in_frame(rods: Sequence[Cylinder], reference: str, poses: Poses) -> Array:
     """Return the ends of rods (rods, 2, 3) in the frame of the reference link."""
-    frames = [inverse(poses(reference)) @ poses(rod.link) for rod in rods]
+    frames = [invert_pose(poses(reference)) @ poses(rod.link) for rod in rods]
     return np.array([rod.ends @ X[:3, :3].T + X[:3, 3] for rod, X in zip(rods, frames, strict=True)])
 
 
@@ -169,9 +169,9 @@ def facing(points: Array, ahead: Array, right: Array, blank: Camera | None = Non
     middle = points.reshape(-1, 3).mean(axis=0)
     R = np.column_stack([right, np.cross(ahead, right), ahead])
     local = (points - middle) @ R
-    half = MARGIN * np.array([blank.width, blank.height]) / 2 / blank.focal
+    half = IMAGE_USABLE_FRACTION * np.array([blank.width, blank.height]) / 2 / blank.focal
     back = float(np.max(np.abs(local[..., :2]) / half - local[..., 2:]))
-    return Camera(pose(middle - back * ahead, R), blank.focal, blank.width, blank.height)
+    return Camera(build_pose(middle - back * ahead, R), blank.focal, blank.width, blank.height)
 
 
 def sensitivity(ends: Array, radius: float) -> float:
@@ -184,8 +184,8 @@ def sensitivity(ends: Array, radius: float) -> float:
     u, total = rebuilt(*normals), 0.0
     for side, end in product(range(2), repeat=2):
         wrong = list(normals)
-        wrong[side] = _move_edge(normals[side], ends, NUDGE * np.eye(2)[end])
-        total += float(np.linalg.norm(rebuilt(*wrong) - u)) / NUDGE
+        wrong[side] = _move_edge(normals[side], ends, SLOPE_STEP_MAX * np.eye(2)[end])
+        total += float(np.linalg.norm(rebuilt(*wrong) - u)) / SLOPE_STEP_MAX
     return total
 
 

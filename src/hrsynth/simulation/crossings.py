@@ -15,17 +15,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..geometry.ranks import range_basis
+from ..geometry.ranks import compute_range_basis
 from ..geometry.vectors import Array
 from ..kinematics.chart import TangentChart
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.velocity_relation import ObservationModel
 from ..records import Number
 from ..results import Value
-from ..tolerances import DAMPED, INVERTED
+from ..tolerances import CONTROLLER_DAMPING_MIN, PSEUDOINVERSE_CUTOFF_FRACTION
 
 TYPE_2, TYPE_1, LIMIT, CONSTRAINT = "type2", "type1", "limit", "constraint"
-LOOPS = 2
+LOOP_MAP_INDEX = 2
 """Index of the loops among the three maps."""
 
 
@@ -95,16 +95,16 @@ class _Mark:
         )
 
     @property
-    def clear(self) -> bool:
+    def is_clear(self) -> bool:
         """Return True if no map is singular, so that the sides can be compared."""
-        return bool(np.all(self.least > DAMPED))
+        return bool(np.all(self.least > CONTROLLER_DAMPING_MIN))
 
     def smallest(self, dof: int) -> float:
         """Smallest singular value of Mᵀ."""
         left, values, _ = np.linalg.svd(self.twists, full_matrices=False)
-        if len(values) < dof or values[dof - 1] <= INVERTED * values[0]:
+        if len(values) < dof or values[dof - 1] <= PSEUDOINVERSE_CUTOFF_FRACTION * values[0]:
             return np.nan
-        inverse = np.linalg.pinv(self.twists, rcond=INVERTED) @ left[:, :dof]
+        inverse = np.linalg.pinv(self.twists, rcond=PSEUDOINVERSE_CUTOFF_FRACTION) @ left[:, :dof]
         return float(np.linalg.svd(self.rates @ inverse, compute_uv=False)[dof - 1])
 
 
@@ -126,11 +126,11 @@ def track_run(
     known, since = [0, 0, 0], np.ones(3)
     for place in range(1, len(marks)):
         since = since * _sign(marks[place].basis.T @ marks[place - 1].basis)
-        for i in np.flatnonzero(marks[place].least > INVERTED):
-            turned = _turned_maps(marks[known[i]], marks[place])[i] * (1.0 if i == LOOPS else since[i])
+        for i in np.flatnonzero(marks[place].least > PSEUDOINVERSE_CUTOFF_FRACTION):
+            turned = _turned_maps(marks[known[i]], marks[place])[i] * (1.0 if i == LOOP_MAP_INDEX else since[i])
             here[i], last[i] = here[i] * turned, place if turned < 0 else last[i]
             known[i], since[i] = place, 1.0
-        if marks[place].clear and np.any(here != before):
+        if marks[place].is_clear and np.any(here != before):
             rates, twists, loops = here != before
             if loops:
                 passages.append(RunCrossing(CONSTRAINT, int(last[2])))
@@ -154,7 +154,7 @@ def _mark(at: ClosedConfiguration, observation_model: ObservationModel, moving: 
         rows[observation_model.twist_rows :],
         rows[: observation_model.twist_rows],
         loops,
-        range_basis(loops)[0],
+        compute_range_basis(loops)[0],
         at.kernel()[1].weakest,
     )
 

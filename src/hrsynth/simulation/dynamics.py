@@ -12,22 +12,22 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.observed import ObservedRobot, motors
-from ..errors import BadRequest, LoopsNotClosed, MissingExtra
-from ..geometry.ranks import range_basis
+from ..analysis.observed import ObservedRobot, build_motor_model
+from ..errors import BadRequest, LoopClosureFailure, MissingExtra
+from ..geometry.ranks import compute_range_basis
 from ..geometry.vectors import Array
 from ..kinematics.chart import TangentChart
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.locked_twists import rezero
-from ..kinematics.velocity_relation import relation
+from ..kinematics.locked_twists import set_zero
+from ..kinematics.velocity_relation import compute_relation
 from ..mechanism import Mechanism
 from ..progress import report
-from ..tolerances import BENCH_SETTLED, BENCH_STEADY
+from ..tolerances import DYNAMICS_SETTLED_ERROR_TOL, DYNAMICS_STEADY_CHANGE_FRACTION
 from .law import Command, Measures, Poses
-from .mujoco_model import STEP, coordinates, mockup
+from .mujoco_model import MUJOCO_STEP_S, coordinates, mockup
 from .run import OPEN, SERVED_AT, TIME, Loop, Run
 
-SAMPLE = 0.01
+CONTROL_PERIOD_S = 0.01
 """Seconds between two commands."""
 
 
@@ -52,8 +52,8 @@ class DynamicSimulation:
         """Build the dynamic simulation; raises ``MissingExtra``, and ``BadRequest`` if the motors do not determine the
         robot's motion."""
         simulator("the dynamic simulation")
-        observation_model = motors(setup)
-        if relation(start, observation_model).unobserved_twists.shape[1]:
+        observation_model = build_motor_model(setup)
+        if compute_relation(start, observation_model).unobserved_twists.shape[1]:
             raise BadRequest(
                 f"{setup.robot.name}: its motors do not determine the platform's motion",
                 str(setup.motion.pose(start.pose(setup.motion.link))),
@@ -64,7 +64,7 @@ class DynamicSimulation:
     @cached_property
     def mechanism(self) -> Mechanism:
         """Robot with the start as its zero configuration."""
-        return rezero(self.start)
+        return set_zero(self.start)
 
     @cached_property
     def _model(self) -> Any:
@@ -72,7 +72,9 @@ class DynamicSimulation:
 
     @cached_property
     def _names(self) -> list[str]:
-        return [name for joint in self.mechanism.joints.values() if joint.actuated for name, _, _ in coordinates(joint)]
+        return [
+            name for joint in self.mechanism.joints.values() if joint.is_actuated for name, _, _ in coordinates(joint)
+        ]
 
     def run(self, loop: Loop, horizon: float) -> tuple[Run, Array]:
         """Run until the error is below ``BENCH_SETTLED`` or ``horizon`` (s); also the displacement of the platform
@@ -107,18 +109,18 @@ class DynamicSimulation:
                 stopped = SERVED_AT
                 break
             data.ctrl[motors] = command.velocity[driven] * scale
-            mujoco.mj_step(model, data, nstep=round(SAMPLE / STEP))
+            mujoco.mj_step(model, data, nstep=round(CONTROL_PERIOD_S / MUJOCO_STEP_S))
             mujoco.mj_kinematics(model, data)
-            time += SAMPLE
+            time += CONTROL_PERIOD_S
         run = Run(np.array(times), tuple(c for c, _ in states), tuple(c for _, c in states), stopped)
         return run, displacement(data, self.setup.motion.link)
 
     def _is_settled(self, loop: Loop, commands: list[Command]) -> bool:
         """Return True if the error vanishes, or has been constant for a time constant 1 / λ."""
-        now, back = commands[-1].size, round(1 / (loop.law.gain * SAMPLE))
-        if now < BENCH_SETTLED:
+        now, back = commands[-1].size, round(1 / (loop.law.gain * CONTROL_PERIOD_S))
+        if now < DYNAMICS_SETTLED_ERROR_TOL:
             return True
-        return len(commands) > back and abs(now - commands[-1 - back].size) < BENCH_STEADY * now
+        return len(commands) > back and abs(now - commands[-1 - back].size) < DYNAMICS_STEADY_CHANGE_FRACTION * now
 
     def _command(self, loop: Loop, time: float, at: ClosedConfiguration, data: Any) -> Command:
         """Return the command of the law for the directions of the simulated bodies."""
@@ -145,11 +147,11 @@ def read_encoders(
 ) -> ClosedConfiguration | None:
     """Return the configuration next to ``at`` with these motor displacements since the start; None if there is none.
     Displacements that coupled motors cannot have are projected out."""
-    free, _ = range_basis(at.kernel()[0][places], 1.0)
+    free, _ = compute_range_basis(at.kernel()[0][places], 1.0)
     chart = TangentChart(start, np.eye(at.model.nv)[:, places] @ free)
     try:
         return chart.at(free.T @ moved, at.q, iterations=30)
-    except LoopsNotClosed:
+    except LoopClosureFailure:
         return None
 
 

@@ -18,18 +18,18 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ..budgets import FARTHEST_POSE
-from ..errors import BadRequest, PoseNotReached
+from ..budgets import POSE_VALUE_MAX
+from ..errors import BadRequest, PoseReachFailure
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration, measure
 from ..kinematics.continuation import lead_to
 from ..kinematics.platform_motion import PlatformMotion, PoseTask
 from ..kinematics.velocity_relation import ObservationModel
-from ..mechanism.cameras import CameraObservation, depth_plane
+from ..mechanism.cameras import CameraObservation, make_depth_plane
 from ..mechanism.observations.direction import SeenAxis
-from ..options import option, plain_number
+from ..options import option, parse_plain_number
 from ..results import Value
-from ..tolerances import DAMPED
+from ..tolerances import CONTROLLER_DAMPING_MIN
 
 Measures = Sequence[Array] | Array
 """The values (size,) of each observation, lengths in characteristic lengths; of directions also as (k, 3)."""
@@ -39,7 +39,7 @@ Poses = Callable[[str], Array]
 """The pose X_BL (4, 4) of each link."""
 Sense = Callable[[float, Poses, Measures], Measures]
 """Measured values at a time, given link poses and true values."""
-POSES = 24
+TRAJECTORY_POSES_COUNT = 24
 """Poses between start and goal at which the values of a trajectory are taken."""
 SUPPOSED = "exact, desired or constant:METRES"
 
@@ -156,17 +156,17 @@ def supposed_planes(
     if text == "exact":
         return None
     try:
-        depth = None if text == "desired" else plain_number(number)
+        depth = None if text == "desired" else parse_plain_number(number)
     except ValueError:
         depth = np.nan
-    if depth is not None and not (word == "constant" and 0 < depth <= FARTHEST_POSE):
-        raise BadRequest("--depth", text, f"{SUPPOSED} (0 to {FARTHEST_POSE:g})")
+    if depth is not None and not (word == "constant" and 0 < depth <= POSE_VALUE_MAX):
+        raise BadRequest("--depth", text, f"{SUPPOSED} (0 to {POSE_VALUE_MAX:g})")
     found: list[Array | None] = []
     for seen in observation_model.observations:
         plane = None
         if isinstance(seen, CameraObservation):
             plane = seen.plane_at(goal.pose(seen.seen_from or observation_model.reference), goal.pose(seen.link))
-        found.append(plane if plane is None or depth is None else depth_plane(np.array([depth])))
+        found.append(plane if plane is None or depth is None else make_depth_plane(np.array([depth])))
     if not any(plane is not None for plane in found):
         raise BadRequest(
             f"--depth {text}: no observation needs a depth",
@@ -178,7 +178,7 @@ def supposed_planes(
 def damped_inverses(values: Array) -> Array:
     """The singular values (descending) of a damped pseudo-inverse: exact but where a value is below ``DAMPED``, then
     σ / (σ² + μ²), μ² growing from 0 to ``DAMPED``² as σ vanishes."""
-    damping = np.maximum(DAMPED**2 - values**2, 0.0)
+    damping = np.maximum(CONTROLLER_DAMPING_MIN**2 - values**2, 0.0)
     return np.asarray(values / (values**2 + damping))
 
 
@@ -253,15 +253,15 @@ def straight(
 ) -> tuple[Trajectory, ClosedConfiguration]:
     """The trajectory of the values on the straight way from ``start`` to a goal of the whole pose (where parts of
     the pose depend on each other, along the poses nearest to it), and the configuration at its end; raises
-    ``PoseNotReached`` where the way is blocked."""
+    ``PoseReachFailure`` where the way is blocked."""
     X = start.pose(motion.link)
     every = observation_model.observations
     here, marks = start, [measure_all(start, observation_model)[0]]
-    for fraction in np.linspace(0, 1, POSES + 1)[1:]:
+    for fraction in np.linspace(0, 1, TRAJECTORY_POSES_COUNT + 1)[1:]:
         here, came = lead_to(here, motion, goal.towards(X, float(fraction)), last=fraction == 1)
         if not came:
             at = motion.pose(here.pose(motion.link))
-            raise PoseNotReached(
+            raise PoseReachFailure(
                 start.model.mechanism.name,
                 str(motion.pose(goal_pose(goal))),
                 float(fraction),

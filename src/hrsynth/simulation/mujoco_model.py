@@ -15,29 +15,29 @@ import numpy as np
 
 from ..errors import BadMechanism
 from ..geometry.vectors import Array
-from ..kinematics.pinocchio_model import across
+from ..kinematics.pinocchio_model import choose_slide_direction
 from ..mechanism import Joint, JointType, Mechanism, graphs
-from ..mechanism.screws import elementary
+from ..mechanism.screws import split_elementary
 
-GRAVITY = 9.81
+GRAVITY_ACCELERATION = 9.81
 """m/s²."""
-DENSITY = 1500.0
+ROD_DENSITY = 1500.0
 """Density of all rods (kg/m³)."""
-RADIUS = 0.02
+MUJOCO_ROD_RADIUS_FRACTION = 0.02
 """Radius of all rods, in characteristic lengths of the robot."""
-STEP = 5e-4
+MUJOCO_STEP_S = 5e-4
 """Seconds of a step of the simulation."""
 STIFF = {"solref": "0.001 1", "solimp": "0.9999 0.9999 0.001 0.5 2"}
 """Loops that keep closed to micrometres."""
-ROTOR = 1e4
+ROTOR_INERTIA_FRACTION = 1e4
 """Rotor inertia of a geared motor: fraction of the inertia of a rod as long as the robot."""
-LAG = 0.004
+MOTOR_TIME_CONSTANT_S = 0.004
 """Time constant of a motor's velocity servo with that rotor (s)."""
-CUT = 100.0
+CUT_JOINT_INERTIA_FRACTION = 100.0
 """Inertia added to a joint through which a loop is cut: fraction of the same; its light body yields without."""
-DAMPING = 1e-3
+PASSIVE_DAMPING_FRACTION = 1e-3
 """Damping of passive joints, as a fraction of that inertia per second."""
-DRIVEN = 100.0
+ACTUATED_TREE_WEIGHT_COUNT = 100.0
 _WEIGHTS = {"F": 0.0, "R": 1.0, "P": 1.0, "C": 2.0, "U": 2.0, "E": 3.0, "S": 4.0}
 
 
@@ -51,7 +51,7 @@ class MujocoModel:
     @property
     def radius(self) -> float:
         """Radius of the rods (m)."""
-        return RADIUS * self.mechanism.length
+        return MUJOCO_ROD_RADIUS_FRACTION * self.mechanism.length
 
 
 def mockup(mechanism: Mechanism) -> str:
@@ -63,14 +63,14 @@ def mockup(mechanism: Mechanism) -> str:
     Xml.SubElement(
         root,
         "option",
-        timestep=str(STEP),
-        gravity=f"0 0 {-GRAVITY}",
+        timestep=str(MUJOCO_STEP_S),
+        gravity=f"0 0 {-GRAVITY_ACCELERATION}",
         integrator="implicitfast",
         iterations="100",
         tolerance="1e-12",
     )
     Xml.SubElement(root, "compiler", angle="radian", autolimits="false", inertiafromgeom="true")
-    Xml.SubElement(Xml.SubElement(root, "default"), "geom", contype="0", conaffinity="0", density=str(DENSITY))
+    Xml.SubElement(Xml.SubElement(root, "default"), "geom", contype="0", conaffinity="0", density=str(ROD_DENSITY))
     world = Xml.SubElement(root, "worldbody")
     equality = Xml.SubElement(root, "equality")
     actuator = Xml.SubElement(root, "actuator")
@@ -95,9 +95,11 @@ def _cut(mechanism: Mechanism) -> tuple[list[tuple[Joint, str]], list[Joint]]:
     for joint in joints:
         if joint.type is JointType.FREE:
             raise BadMechanism(f"{mechanism.name}: a joint with six dof has no MuJoCo model", joint.name)
-    weights = [_WEIGHTS[joint.type.value] - (DRIVEN if joint.actuated else 0.0) for joint in joints]
-    tree = graphs.spanning_forest(mechanism.links, joints, weights)
-    ordered = [(joint, near) for joint, near, _ in graphs.outward(mechanism.base, tree)]
+    weights = [
+        _WEIGHTS[joint.type.value] - (ACTUATED_TREE_WEIGHT_COUNT if joint.is_actuated else 0.0) for joint in joints
+    ]
+    tree = graphs.build_spanning_forest(mechanism.links, joints, weights)
+    ordered = [(joint, near) for joint, near, _ in graphs.order_outward(mechanism.base, tree)]
     return ordered, [joint for joint in joints if all(joint is not each for each in tree)]
 
 
@@ -106,7 +108,7 @@ def coordinates(joint: Joint) -> Iterator[tuple[str, str, Array]]:
     if joint.type is JointType.SPHERICAL:
         yield joint.name, "ball", np.array([0.0, 0.0, 1.0])
         return
-    found = elementary(joint.type, joint.axes, across)
+    found = split_elementary(joint.type, joint.axes, choose_slide_direction)
     for number, (kind, axis) in enumerate(found):
         yield (
             f"{joint.name}__{number}" if len(found) > 1 else joint.name,
@@ -119,8 +121,8 @@ def _joints(made: MujocoModel, body: Xml.Element, joint: Joint, extra: float = 0
     for name, kind, axis in coordinates(joint):
         inertia = _inertia(made.mechanism, kind)
         moving = {
-            "armature": (ROTOR if joint.actuated else extra) * inertia,
-            "damping": 0.0 if joint.actuated else DAMPING * inertia,
+            "armature": (ROTOR_INERTIA_FRACTION if joint.is_actuated else extra) * inertia,
+            "damping": 0.0 if joint.is_actuated else PASSIVE_DAMPING_FRACTION * inertia,
         }
         Xml.SubElement(
             body,
@@ -142,15 +144,15 @@ def _loop(made: MujocoModel, bodies: Mapping[str, Xml.Element], equality: Xml.El
         )
         return
     half = _body(bodies[a], f"{joint.name}__cut")
-    _joints(made, half, joint, CUT)
+    _joints(made, half, joint, CUT_JOINT_INERTIA_FRACTION)
     Xml.SubElement(half, "geom", type="sphere", size=_text([made.radius / 2]), pos=_text(joint.point), group="3")
     Xml.SubElement(equality, "weld", STIFF, body1=f"{joint.name}__cut", body2=_name(made, b), anchor=_text(joint.point))
 
 
 def _drive(made: MujocoModel, actuator: Xml.Element, tree: list[Joint]) -> None:
     for joint in tree:
-        for name, kind, _ in coordinates(joint) if joint.actuated else ():
-            gain = ROTOR / LAG * _inertia(made.mechanism, kind)
+        for name, kind, _ in coordinates(joint) if joint.is_actuated else ():
+            gain = ROTOR_INERTIA_FRACTION / MOTOR_TIME_CONSTANT_S * _inertia(made.mechanism, kind)
             Xml.SubElement(actuator, "velocity", name=name, joint=name, kv=f"{gain:.9g}")
 
 
@@ -197,7 +199,7 @@ def _rods(made: MujocoModel, body: Xml.Element, link: str) -> None:
 
 def _inertia(mechanism: Mechanism, kind: str) -> float:
     """A rod as long as the robot: its mass (kg) for what slides, else its mass times its squared length (kg m²)."""
-    mass = DENSITY * np.pi * RADIUS**2 * mechanism.length**3
+    mass = ROD_DENSITY * np.pi * MUJOCO_ROD_RADIUS_FRACTION**2 * mechanism.length**3
     return mass if kind == "slide" else mass * mechanism.length**2
 
 

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.vectors import Array
-from ..mechanism.noise import Noise, vectors
+from ..mechanism.noise import Noise, count_vectors
 from ..mechanism.observation import Observation
 from ..results import Value
 
-PERIOD = 0.04
+NOISE_PERIOD_S = 0.04
 """Seconds between two independent errors (25 images per second); in between they change linearly."""
 
 
@@ -29,13 +29,13 @@ class NoiseSamples(Value):
     def draw(cls, count: int, horizon: float, seed: int, bias: bool = False) -> NoiseSamples:
         """Draw samples of ``count`` quantities until ``horizon`` (s), uniform in the ball; one each for a bias."""
         rng = np.random.default_rng(seed)
-        shape = (1 if bias else math.ceil(horizon / PERIOD) + 2, count)
+        shape = (1 if bias else math.ceil(horizon / NOISE_PERIOD_S) + 2, count)
         vectors = rng.normal(size=(*shape, 3))
         return cls(vectors / np.linalg.norm(vectors, axis=2, keepdims=True) * rng.uniform(size=(*shape, 1)) ** (1 / 3))
 
     def at(self, time: float) -> Array:
         """The vectors (k, 3) at a time."""
-        place = min(max(time / PERIOD, 0.0), len(self.table) - 1.0)
+        place = min(max(time / NOISE_PERIOD_S, 0.0), len(self.table) - 1.0)
         first = int(place)
         part, after = place - first, min(first + 1, len(self.table) - 1)
         return np.asarray((1 - part) * self.table[first] + part * self.table[after])
@@ -56,14 +56,14 @@ class Sensors(Value):
         """Build the sensors for a seed, until ``horizon`` (s); raises ``BadRequest`` for noise that none of them has,
         and for pixels of a camera without a focal length."""
         amounts = noise.amounts_for(observations)
-        count = sum(vectors(each) for each in observations)
+        count = sum(count_vectors(each) for each in observations)
         return cls(tuple(observations), amounts, NoiseSamples.draw(count, horizon, seed, noise.bias), length)
 
     def __call__(self, time: float, poses: Callable[[str], Array], values: Sequence[Array] | Array) -> list[Array]:
         """Return the measurements of true values."""
         shocks, first, found = self.shocks.at(time), 0, []
         for each, value in zip(self.observations, values, strict=True):
-            own = shocks[first : first + vectors(each)]
+            own = shocks[first : first + count_vectors(each)]
             first += len(own)
             unit = self.length ** np.broadcast_to(each.dimension, each.size)
             noisy = each.found_by & self.amounts.keys()

@@ -11,14 +11,14 @@ import numpy as np
 from ..analysis.configuration_report import ConfigurationAnalysis
 from ..analysis.modes.modes import AssemblyModes, modes
 from ..analysis.observed import ObservedRobot
-from ..budgets import RUN_EVALUATIONS
+from ..budgets import RUN_EVALUATIONS_MAX
 from ..errors import HrsynthError
-from ..geometry.vectors import Array, pose_difference
+from ..geometry.vectors import Array, compare_poses
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism.observations.direction import SeenAxis
 from ..records import As, Recorded
 from ..results import Value
-from ..tolerances import DAMPED, NEAR_MODE, SAME_NEAR_POSE, SAME_RELATION
+from ..tolerances import CONTROLLER_DAMPING_MIN, NEAR_MODE_DISTANCE_MAX, NEAR_POSE_DIFFERENCE_TOL, RELATION_ANGLE_TOL
 from .law import Command, Measures
 from .run import AWAY, EFFORT, LIMIT, LOST, OPEN, POISED, REST, SERVED_AT, UNMEASURED, UNSEEN, Run
 
@@ -72,14 +72,14 @@ class OutcomeClassifier(Value):
         if run.stopped == AWAY:
             return RunOutcome(BOUNDARY, "the platform runs away: no joint limit stops it")
         over = (
-            f"more than {RUN_EVALUATIONS:,} configurations would be needed"
+            f"more than {RUN_EVALUATIONS_MAX:,} configurations would be needed"
             if run.stopped == EFFORT
             else "the time ran out"
         )
         way = ""
         if run.ahead is not None:
             there, slow = run.ahead
-            goal = self.same_pose(there, self.goal.pose(self.setup.motion.link))
+            goal = self.is_at_pose(there, self.goal.pose(self.setup.motion.link))
             pose = "the goal" if goal else str(self.setup.motion.pose(there.pose(self.setup.motion.link)))
             way = f"; it was still approaching a stable equilibrium at {pose}, with the time constant {slow:.3g} s"
         return RunOutcome(TIME, f"{over}, with ‖e‖ = {last.size:.3g}{way}")
@@ -88,7 +88,11 @@ class OutcomeClassifier(Value):
         """Return a text on the near mode of the goal at an equilibrium, if any."""
         motion = self.setup.motion
         try:
-            listed = modes(self.setup, at=motion.pose(self.goal.pose(motion.link))) if size < NEAR_MODE else None
+            listed = (
+                modes(self.setup, at=motion.pose(self.goal.pose(motion.link)))
+                if size < NEAR_MODE_DISTANCE_MAX
+                else None
+            )
         except HrsynthError:
             return ""
         return next(
@@ -97,7 +101,7 @@ class OutcomeClassifier(Value):
                 for k, mode in enumerate(() if listed is None else listed.near_modes, 1)
                 if mode.bodies
                 and all(
-                    pose_difference(at.pose(body), X, at.model.length) <= SAME_NEAR_POSE
+                    compare_poses(at.pose(body), X, at.model.length) <= NEAR_POSE_DIFFERENCE_TOL
                     for body, X in mode.bodies.items()
                 )
             ),
@@ -118,13 +122,13 @@ class OutcomeClassifier(Value):
         ]
         word = "directions" if len(opposite) == len(self.setup.observed) else "measurements"
         if any(opposite):
-            there = "; the pose is the goal's" if self.same_pose(at, self.goal.pose(self.setup.motion.link)) else ""
+            there = "; the pose is the goal's" if self.is_at_pose(at, self.goal.pose(self.setup.motion.link)) else ""
             return RunOutcome(
                 ANTIPODAL,
                 f"{sum(opposite)} of {len(opposite)} directions are opposite to the desired ones, where the error "
                 f"vanishes as well{there}",
             )
-        if self.same_pose(at, self.goal.pose(self.setup.motion.link)):
+        if self.is_at_pose(at, self.goal.pose(self.setup.motion.link)):
             return RunOutcome(GOAL, f"the {word} and the pose are those of the goal")
         try:
             motion = self.setup.motion
@@ -133,7 +137,7 @@ class OutcomeClassifier(Value):
             return RunOutcome(MODE, f"the {word} are the goal's, the pose is not; assembly modes not listed: {error}")
         for number, mode in enumerate(listed.modes, 1):
             bodies = mode.bodies or {}
-            if bodies and all(self._alike(at.pose(body), X, None) for body, X in bodies.items()):
+            if bodies and all(self._is_same_pose(at.pose(body), X, None) for body, X in bodies.items()):
                 return RunOutcome(
                     MODE,
                     f"the {word} are the goal's, the pose is its assembly mode {number} of {len(listed.modes)}",
@@ -144,12 +148,12 @@ class OutcomeClassifier(Value):
             MODE, f"the {word} are the goal's, the pose is none of the listed assembly modes", None, listed
         )
 
-    def same_pose(self, at: ClosedConfiguration, X: Array) -> bool:
+    def is_at_pose(self, at: ClosedConfiguration, X: Array) -> bool:
         """Return True if the platform of a configuration is at X (4, 4), to ``SAME_RELATION``."""
-        return self._alike(at.pose(self.setup.motion.link), X, self.setup.decomposition.point)
+        return self._is_same_pose(at.pose(self.setup.motion.link), X, self.setup.decomposition.point)
 
-    def _alike(self, X: Array, other: Array, point: Array | None) -> bool:
-        return pose_difference(X, other, self.goal.model.length, point) <= SAME_RELATION
+    def _is_same_pose(self, X: Array, other: Array, point: Array | None) -> bool:
+        return compare_poses(X, other, self.goal.model.length, point) <= RELATION_ANGLE_TOL
 
 
 def rest(setup: ObservedRobot, at: ClosedConfiguration, last: Command) -> RunOutcome:
@@ -157,16 +161,16 @@ def rest(setup: ObservedRobot, at: ClosedConfiguration, last: Command) -> RunOut
     the limit of a leg's reach, or neither."""
     posture = ConfigurationAnalysis.of(setup).classify(at)
     where = f"‖e‖ = {last.size:.3g} and the command vanishes"
-    weak = float(last.values[-1]) < DAMPED
+    weak = float(last.values[-1]) < CONTROLLER_DAMPING_MIN
     shifted = at.velocity(setup.motion.link) @ last.weak
-    if weak and float(np.linalg.norm(shifted)) < DAMPED:
+    if weak and float(np.linalg.norm(shifted)) < CONTROLLER_DAMPING_MIN:
         tree = len(at.model.mechanism.joints) < len(at.model.mechanism.links)
         why = "the arm is singular, for example stretched" if tree else "an unobserved leg is at the limit of its reach"
         return RunOutcome(BOUNDARY, f"{where}: {why}")
     far = posture.distances
-    if weak and far.type2 is not None and far.type2 < DAMPED:
+    if weak and far.type2 is not None and far.type2 < CONTROLLER_DAMPING_MIN:
         return RunOutcome(MINIMUM, f"{where} at a Type 2 singularity of the hidden robot")
-    if (far.type1 is not None and far.type1 < DAMPED) or far.type2 is None:
+    if (far.type1 is not None and far.type1 < CONTROLLER_DAMPING_MIN) or far.type2 is None:
         return RunOutcome(MINIMUM, f"{where} at a Type 1 singularity of the hidden robot")
     if weak and any(isinstance(each, SeenAxis) for each in setup.observed):
         return RunOutcome(

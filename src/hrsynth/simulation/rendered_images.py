@@ -10,26 +10,26 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from ..budgets import PICTURE_OVERSAMPLING
-from ..errors import MissingExtra, NotRendered
-from ..geometry.vectors import Array, inverse, unit
+from ..budgets import IMAGE_OVERSAMPLING_COUNT
+from ..errors import MissingExtra, RenderFailure
+from ..geometry.vectors import Array, invert_pose, normalise_vector
 from ..mechanism import Mechanism
 from .camera import Camera, Cylinder, rebuilt
 from .dynamics import simulator
 from .law import Measures, Poses
-from .mujoco_model import RADIUS, rods
-from .noise import PERIOD
+from .mujoco_model import MUJOCO_ROD_RADIUS_FRACTION, rods
+from .noise import NOISE_PERIOD_S
 
 COLOURS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [0, 1, 1], [1, 0, 1]], dtype=float)
 """Colours of the observed legs, on black; the others are dark grey."""
-GREY = 0.12
-PURE = 60.0
+LINK_GREY_FRACTION = 0.12
+LEG_COLOUR_TOL = 60.0
 """Largest distance (of 255) of a pixel from the colours between black and a leg's to count as that leg's."""
-BLACK = 8.0
+BACKGROUND_LIGHTNESS_MAX = 8.0
 """Lightness (of 255) below which nothing is there."""
-KEPT = 0.8
+LEG_EDGE_LENGTH_FRACTION = 0.8
 """Part of a leg's length, from its middle, whose edges are used."""
-REACH = 3.0
+EDGE_SEARCH_PIXELS_COUNT = 3.0
 """Pixels on both sides of an edge between which it is placed."""
 
 
@@ -66,15 +66,15 @@ class LegRenderer:
 
     @cached_property
     def _model(self) -> Any:
-        camera, radius = self.camera, RADIUS * self.mechanism.length
+        camera, radius = self.camera, MUJOCO_ROD_RADIUS_FRACTION * self.mechanism.length
         root = Xml.Element("mujoco")
         fov = np.degrees(2 * np.arctan(camera.height / 2 / camera.focal))
         visual = Xml.SubElement(root, "visual")
         Xml.SubElement(
             visual,
             "global",
-            offwidth=str(PICTURE_OVERSAMPLING * camera.width),
-            offheight=str(PICTURE_OVERSAMPLING * camera.height),
+            offwidth=str(IMAGE_OVERSAMPLING_COUNT * camera.width),
+            offheight=str(IMAGE_OVERSAMPLING_COUNT * camera.height),
         )
         Xml.SubElement(visual, "map", znear=str(0.02))
         Xml.SubElement(visual, "quality", offsamples="8")
@@ -82,9 +82,10 @@ class LegRenderer:
         world = Xml.SubElement(root, "worldbody")
         for link in self._links:
             body = Xml.SubElement(world, "body", name=link, mocap="true")
-            X = inverse(self.mechanism.links[link].pose)
+            X = invert_pose(self.mechanism.links[link].pose)
             drawn = [
-                (ends @ X[:3, :3].T + X[:3, 3], GREY * np.ones(3)) for ends in map(np.array, rods(self.mechanism, link))
+                (ends @ X[:3, :3].T + X[:3, 3], LINK_GREY_FRACTION * np.ones(3))
+                for ends in map(np.array, rods(self.mechanism, link))
             ]
             watched = [(rod.ends, COLOURS[i % len(COLOURS)]) for i, rod in enumerate(self.rods) if rod.link == link]
             for ends, colour in watched or drawn:
@@ -111,11 +112,11 @@ class LegRenderer:
                 self._model, self.fineness * self.camera.height, self.fineness * self.camera.width
             )
         except (mujoco.FatalError, RuntimeError, AttributeError) as error:
-            raise NotRendered(str(error)) from None
+            raise RenderFailure(str(error)) from None
         return mujoco.MjData(self._model), renderer
 
     def picture(self, poses: Poses) -> Array:
-        """Return the image (height, width, 3), 0 to 255, with the links at their poses; raises ``NotRendered``."""
+        """Return the image (height, width, 3), 0 to 255, with the links at their poses; raises ``RenderFailure``."""
         mujoco = drawing()
         data, renderer = self._renderer
         for link in self._links:
@@ -131,7 +132,7 @@ class LegRenderer:
     @cached_property
     def finer(self) -> LegRenderer:
         """Return a renderer with pixels fine enough for edge detection."""
-        return replace(self, fineness=PICTURE_OVERSAMPLING)
+        return replace(self, fineness=IMAGE_OVERSAMPLING_COUNT)
 
     def _put(self, data: Any, name: str, X: Array) -> None:
         mujoco = drawing()
@@ -151,7 +152,7 @@ class RenderedImages:
         """The measured directions (k, 3) in the reference link's frame; a leg of which too little is seen keeps its
         true one."""
         directions = np.array(values)
-        sample = int(time / PERIOD + 1e-9)
+        sample = int(time / NOISE_PERIOD_S + 1e-9)
         if sample not in self._held:
             self._held[sample] = self._measure(poses, directions) - directions
         moved = directions + self._held[sample]
@@ -173,7 +174,7 @@ def shade(picture: Array, colour: Array) -> Array:
     """Return the coverage of each pixel by a leg of a colour, 0 to 255, (height, width); 0 for other colours."""
     cover = picture @ colour / float(colour @ colour)
     other = np.linalg.norm(picture - cover[..., None] * colour, axis=2)
-    return np.where(other < PURE, cover, 0.0)
+    return np.where(other < LEG_COLOUR_TOL, cover, 0.0)
 
 
 def outlines(cover: Array, light: Array, camera: Camera) -> tuple[Array, Array] | None:
@@ -191,7 +192,7 @@ def outlines(cover: Array, light: Array, camera: Camera) -> tuple[Array, Array] 
     across = np.array([-along[1], along[0]])
     rows, columns = np.nonzero(cv2.Canny(grey, 60, 180))
     border = np.column_stack([columns, rows]).astype(float) - middle
-    longest = KEPT * float(np.max(np.abs((inside - middle) @ along)))
+    longest = LEG_EDGE_LENGTH_FRACTION * float(np.max(np.abs((inside - middle) @ along)))
     centre = camera.ray(middle + 0.5)
     normals = []
     for side in (1.0, -1.0):
@@ -201,7 +202,7 @@ def outlines(cover: Array, light: Array, camera: Camera) -> tuple[Array, Array] 
             return None
         vx, vy, x, y = cv2.fitLine(points.astype(np.float32), cv2.DIST_HUBER, 0, 0.001, 0.001).ravel()
         ends = [camera.ray(np.array([x + t * vx + 0.5, y + t * vy + 0.5])) for t in (-longest, longest)]
-        normal = unit(np.cross(ends[0], ends[1]))
+        normal = normalise_vector(np.cross(ends[0], ends[1]))
         normals.append(normal if normal @ centre < 0 else -normal)
     return normals[0], normals[1]
 
@@ -210,13 +211,13 @@ def _place_edge(cover: Array, light: Array, points: Array, outwards: Array) -> A
     """Edge points (n, 2) moved along the outward normal to where half of a pixel is covered; those without such a
     place, or with something else beside it, are left out."""
     cv2 = vision()
-    steps = np.arange(-REACH, REACH + 0.25, 0.25)
+    steps = np.arange(-EDGE_SEARCH_PIXELS_COUNT, EDGE_SEARCH_PIXELS_COUNT + 0.25, 0.25)
     places = points[:, None, :] + steps[None, :, None] * outwards
     maps = places.astype(np.float32)
     values = cv2.remap(cover.astype(np.float32), maps[..., 0], maps[..., 1], cv2.INTER_LINEAR)
     falls = (values[:, :-1] >= 127.5) & (values[:, 1:] < 127.5)
     beside = cv2.remap(light.astype(np.float32), maps[:, -1:, 0], maps[:, -1:, 1], cv2.INTER_LINEAR)[:, 0]
-    kept = (falls.sum(axis=1) == 1) & (beside < BLACK)
+    kept = (falls.sum(axis=1) == 1) & (beside < BACKGROUND_LIGHTNESS_MAX)
     first = np.argmax(falls, axis=1)[kept]
     number = np.nonzero(kept)[0]
     high, low = values[number, first], values[number, first + 1]

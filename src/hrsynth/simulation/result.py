@@ -9,7 +9,7 @@ import numpy as np
 
 from ..analysis.modes.assembly_mode import AssemblyMode
 from ..analysis.observed import UNLIMITED, ObservedRobot
-from ..geometry.so3 import angle_of
+from ..geometry.so3 import compute_rotation_angle
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.joint_coordinates import FileCoordinates
@@ -22,7 +22,7 @@ from .law import Measures
 from .outcome import RunOutcome
 from .run import Run
 
-ASIDE = 0.9
+BIAS_MIN_FRACTION = 0.9
 """Fraction of the root mean square distance that is constant if noise shifts a platform."""
 
 
@@ -41,9 +41,9 @@ class Scatter(Record, all_recorded=True):
     """Distance of that from the pose at which it settled (m): noise that does not average out."""
 
     @property
-    def aside(self) -> bool:
+    def has_bias(self) -> bool:
         """Return True if noise shifts the platform instead of shaking it."""
-        return self.offset > ASIDE * self.rms_metres
+        return self.offset > BIAS_MIN_FRACTION * self.rms_metres
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -142,7 +142,7 @@ class Servo(Result, shown_as="servo"):
     def _turn(self, at: ClosedConfiguration) -> float:
         motion = self.setup.motion
         R = at.pose(motion.link)[:3, :3] @ self.target.pose(motion.link)[:3, :3].T
-        return angle_of(R) if motion.body else 0.0
+        return compute_rotation_angle(R) if motion.body else 0.0
 
     noise_record = Shown(str | None, lambda self: self.noise and str(self.noise), As("noise"))
     modes = Shown(list[AssemblyMode] | None, lambda self: self.run_outcome.modes and self.run_outcome.modes.modes)

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ..budgets import RUN_AWAY, RUN_EVALUATIONS, WIDEST_CHART
-from ..errors import LoopsNotClosed, UndefinedValue
+from ..budgets import RUN_ESCAPE_DISTANCE_MAX, RUN_EVALUATIONS_MAX, TANGENT_CHART_RADIUS_MAX
+from ..errors import LoopClosureFailure, UndefinedValue
 from ..geometry.vectors import Array
 from ..kinematics.chart import TangentChart
 from ..kinematics.configuration import ClosedConfiguration
@@ -23,33 +23,33 @@ from ..kinematics.velocity_relation import ObservationModel
 from ..progress import report
 from ..results import Value
 from ..tolerances import (
-    ARRIVED,
-    AT_REST,
-    INTEGRATED,
-    INVERTED,
-    LOOPS_LOST,
-    NEAR_REST,
-    NEUTRAL_GROWTH,
-    REST_SLOPE,
-    RESTED,
-    RUN_SHORTEST_STEP,
-    SEEN_ABOVE,
-    SERVED,
-    STRETCH_END,
+    EQUILIBRIUM_DISTANCE_TOL,
+    EQUILIBRIUM_NEWTON_STEP_MAX,
+    EQUILIBRIUM_NEWTON_STEP_TOL,
+    EQUILIBRIUM_SLOPE_STEP_MAX,
+    EQUILIBRIUM_SPEED_TOL,
+    LOOP_RANK_LOSS_FRACTION,
+    NEUTRAL_GROWTH_RATE_TOL,
+    PSEUDOINVERSE_CUTOFF_FRACTION,
+    RUN_INTEGRATOR_TOL,
+    RUN_STEP_MIN,
+    RUN_STRETCH_ERROR_FRACTION,
+    SERVO_CONVERGED_TOL,
+    VISIBLE_SINE_MIN,
 )
 from .law import Command, Desired, Law, Sense
-from .noise import PERIOD
+from .noise import NOISE_PERIOD_S
 
 State = tuple[ClosedConfiguration, Command]
 
 SERVED_AT, REST, POISED, LIMIT, UNSEEN, OPEN = "served", "rest", "poised", "limit", "unseen", "open"
 UNMEASURED = "unmeasured"
 AWAY, TIME, EFFORT, LOST = "away", "time", "effort", "lost"
-HALVINGS = 40
+EVENT_BISECTIONS_COUNT = 40
 """Bisections to the time at which a joint reaches its limit, or an observation leaves the field of view."""
-NEWTON_STEPS = 8
+EQUILIBRIUM_NEWTON_STEPS_COUNT = 8
 """Newton steps to an equilibrium."""
-PERSISTS = 0.9
+PERSISTENT_ERROR_FRACTION = 0.9
 """Fraction of an error left a time constant later above which an equilibrium is sought; 1 / e if it vanishes."""
 
 
@@ -93,7 +93,7 @@ class Loop(Value):
     def simulate(self, start: ClosedConfiguration, horizon: float) -> Run:
         """Run until it ends by itself, or ``horizon`` (s)."""
         times, found = [0.0], [(start, self._command(0.0, start))]
-        stopped, left, longest = None, RUN_EVALUATIONS, np.inf
+        stopped, left, longest = None, RUN_EVALUATIONS_MAX, np.inf
         patience, stops = (
             Patience(1 / self.law.gain, 0.0, found[0][1].size),
             CoordinateIntervals.of(start.model, start.q),
@@ -107,14 +107,14 @@ class Loop(Value):
             left, joint = stretch.left, stretch.beyond
             times += reached
             found += states
-            if stopped in (LOST, UNMEASURED) and longest * self.law.gain > RUN_SHORTEST_STEP:
+            if stopped in (LOST, UNMEASURED) and longest * self.law.gain > RUN_STEP_MIN:
                 # the step was too long for the loops to follow, or for the chart: another chart, shorter steps
                 longest, stopped = min(longest, 1 / self.law.gain) / 8, None
-            elif stopped == LOST and _loose(found[-1][0], start):
+            elif stopped == LOST and _is_loop_rank_lost(found[-1][0], start):
                 stopped = OPEN
             elif stopped is None:
                 longest *= 2
-                if self._shift(start, found[-1][0]) > RUN_AWAY:
+                if self._shift(start, found[-1][0]) > RUN_ESCAPE_DISTANCE_MAX:
                     stopped = AWAY
         ahead = self._ahead(times[-1], found[-1][0]) if stopped in (TIME, EFFORT) and self.sensed is None else None
         return Run(np.array(times), tuple(c for c, _ in found), tuple(c for _, c in found), stopped, joint, ahead)
@@ -133,10 +133,10 @@ class Loop(Value):
         home = np.zeros(chart.basis.shape[1])
         try:
             found = rest_near(rate, home)
-            if found is None or found.growth >= -NEUTRAL_GROWTH * self.law.gain or rate(home) @ found.y <= 0:
+            if found is None or found.growth >= -NEUTRAL_GROWTH_RATE_TOL * self.law.gain or rate(home) @ found.y <= 0:
                 return None
             return chart.at(found.y, at.q), -1 / found.growth
-        except (LoopsNotClosed, UndefinedValue):
+        except (LoopClosureFailure, UndefinedValue):
             return None
 
     def _shift(self, start: ClosedConfiguration, at: ClosedConfiguration) -> float:
@@ -193,7 +193,7 @@ class _Stretch:
         if settling and (end := self._end(start, np.zeros(self.chart.basis.shape[1]), first)):
             return ([], [], end[0]) if end[1] is first else ([start], [end[1]], end[0])
         until = horizon if start >= loop.steady else min(horizon, loop.steady)
-        tolerances = {"rtol": INTEGRATED, "atol": INTEGRATED * scale}
+        tolerances = {"rtol": RUN_INTEGRATOR_TOL, "atol": RUN_INTEGRATOR_TOL * scale}
         times: list[float] = []
         states: list[State] = []
         try:
@@ -201,7 +201,7 @@ class _Stretch:
             solver = (
                 LSODA(self.rate, start, y, until, max_step=longest, **tolerances)
                 if loop.smooth
-                else RK23(self.rate, start, y, until, max_step=min(PERIOD, longest), **tolerances)
+                else RK23(self.rate, start, y, until, max_step=min(NOISE_PERIOD_S, longest), **tolerances)
             )
             while solver.status == "running":
                 report("run")
@@ -221,9 +221,11 @@ class _Stretch:
                     return times, states, end[0]
                 if self.left <= 0:
                     return times, states, EFFORT
-                if np.linalg.norm(solver.y) > WIDEST_CHART or (settling and state[1].size < STRETCH_END * scale):
+                if np.linalg.norm(solver.y) > TANGENT_CHART_RADIUS_MAX or (
+                    settling and state[1].size < RUN_STRETCH_ERROR_FRACTION * scale
+                ):
                     return times, states, None
-        except LoopsNotClosed:
+        except LoopClosureFailure:
             return times, states, LOST
         except UndefinedValue:
             return times, states, UNMEASURED
@@ -233,17 +235,21 @@ class _Stretch:
         """Return the reason for which a run with constant, exact directions ends at y (n,), if it does, and its final
         state."""
         command = state[1]
-        if command.size <= SERVED:
+        if command.size <= SERVO_CONVERGED_TOL:
             return SERVED_AT, state
-        poised = command.speed <= AT_REST * self.loop.law.gain * command.size
-        if (poised or self.patience.over(time, command.size)) and (rest := self._rest(time, y)):
-            return SERVED_AT if rest[1].size <= SERVED else REST, rest
+        poised = command.speed <= EQUILIBRIUM_SPEED_TOL * self.loop.law.gain * command.size
+        if (poised or self.patience.is_search_due(time, command.size)) and (rest := self._rest(time, y)):
+            return SERVED_AT if rest[1].size <= SERVO_CONVERGED_TOL else REST, rest
         return (POISED, state) if poised else None
 
     def _rest(self, time: float, y: Array) -> State | None:
         """Return the stable equilibrium that a run at y (n,) has reached; None if it is still moving."""
         found = rest_near(lambda y: self.rate(time, y), y)
-        if found is None or np.linalg.norm(found.y - y) > ARRIVED or found.growth > NEUTRAL_GROWTH * self.loop.law.gain:
+        if (
+            found is None
+            or np.linalg.norm(found.y - y) > EQUILIBRIUM_DISTANCE_TOL
+            or found.growth > NEUTRAL_GROWTH_RATE_TOL * self.loop.law.gain
+        ):
             return None
         return self.state(time, found.y)
 
@@ -255,21 +261,21 @@ class _Stretch:
         if first is not None and past[first] < 0:
             self.beyond = first
             return LIMIT
-        return UNSEEN if self.loop.law.in_front(at) < SEEN_ABOVE else None
+        return UNSEEN if self.loop.law.in_front(at) < VISIBLE_SINE_MIN else None
 
     def _at_limit(self, solver: Any) -> tuple[float, State]:
         """Time and state in the solver's last step up to which nothing ends the run."""
         inside, outside, curve = float(solver.t_old), float(solver.t), solver.dense_output()
-        for _ in range(HALVINGS):
+        for _ in range(EVENT_BISECTIONS_COUNT):
             middle = (inside + outside) / 2
             met = self._stop_reason(self.state(middle, curve(middle))[0]) is not None
             inside, outside = (inside, middle) if met else (middle, outside)
         return inside, self.state(inside, curve(inside))
 
 
-def _loose(at: ClosedConfiguration, start: ClosedConfiguration) -> bool:
+def _is_loop_rank_lost(at: ClosedConfiguration, start: ClosedConfiguration) -> bool:
     """Return True if the loops lose their rank at a configuration."""
-    return at.kernel()[1].weakest < LOOPS_LOST * start.kernel()[1].weakest
+    return at.kernel()[1].weakest < LOOP_RANK_LOSS_FRACTION * start.kernel()[1].weakest
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -286,11 +292,11 @@ class Patience:
     def __init__(self, constant: float, time: float, size: float) -> None:
         self.constant, self._time, self._size = constant, time, size
 
-    def over(self, time: float, size: float) -> bool:
+    def is_search_due(self, time: float, size: float) -> bool:
         """Return True if it is time to search."""
         if time - self._time < self.constant:
             return False
-        persists = size > PERSISTS * self._size
+        persists = size > PERSISTENT_ERROR_FRACTION * self._size
         self._time, self._size = time, size
         return persists
 
@@ -298,18 +304,18 @@ class Patience:
 def rest_near(rate: Callable[[Array], Array], y: Array) -> Standstill | None:
     """Return the equilibrium next to y (n,) by Newton's method on ẏ = rate(y); None if none was found near."""
     try:
-        for _ in range(NEWTON_STEPS):
-            steps = REST_SLOPE * np.eye(len(y))
-            J = np.array([(rate(y + each) - rate(y - each)) / (2 * REST_SLOPE) for each in steps]).T
+        for _ in range(EQUILIBRIUM_NEWTON_STEPS_COUNT):
+            steps = EQUILIBRIUM_SLOPE_STEP_MAX * np.eye(len(y))
+            J = np.array([(rate(y + each) - rate(y - each)) / (2 * EQUILIBRIUM_SLOPE_STEP_MAX) for each in steps]).T
             here = rate(y)
-            step = np.asarray(np.linalg.lstsq(J, -here, rcond=INVERTED)[0], dtype=float)
+            step = np.asarray(np.linalg.lstsq(J, -here, rcond=PSEUDOINVERSE_CUTOFF_FRACTION)[0], dtype=float)
             size = float(np.linalg.norm(step))
             # where J is singular, a velocity outside of its range goes on for ever
-            if not size <= NEAR_REST or np.linalg.norm(here + J @ step) > NEUTRAL_GROWTH:
+            if not size <= EQUILIBRIUM_NEWTON_STEP_MAX or np.linalg.norm(here + J @ step) > NEUTRAL_GROWTH_RATE_TOL:
                 return None
             y = y + step
-            if size <= RESTED:
+            if size <= EQUILIBRIUM_NEWTON_STEP_TOL:
                 return Standstill(y, float(np.linalg.eigvals(J).real.max()))
-    except LoopsNotClosed:
+    except LoopClosureFailure:
         return None
     return None

@@ -9,27 +9,27 @@ from typing import Annotated
 
 import numpy as np
 
-from ..analysis.accuracy.accuracy import sees_all
+from ..analysis.accuracy.accuracy import require_full_observation
 from ..analysis.accuracy.measurement_bounds import IN_SIGHT
 from ..analysis.analysis_declaration import analysis
 from ..analysis.configuration_report import REGULAR, UNDECIDED, ConfigurationAnalysis
 from ..analysis.observed import POINTS, CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike, StartPose
-from ..analysis.pose_requests import configurations_at
-from ..budgets import LONGEST_RUN, RUN_EVALUATIONS
-from ..errors import BadRequest, RankUndecided
-from ..geometry.so3 import angle_of
+from ..analysis.pose_requests import solve_configurations
+from ..budgets import RUN_DURATION_MAX_S, RUN_EVALUATIONS_MAX
+from ..errors import BadRequest, UndecidedRank
+from ..geometry.so3 import compute_rotation_angle
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.limits import outside
+from ..kinematics.limits import list_joints_beyond
 from ..mechanism.noise import Noise
 from ..mechanism.observation import Observation
 from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.observations.point import ImagePoint
-from ..mechanism.pose import PoseLike, asked_pose
+from ..mechanism.pose import PoseLike, parse_pose
 from ..options import option
 from ..progress import report
 from ..results import by_name
-from ..tolerances import RANK_GAP, SEEN_ABOVE
+from ..tolerances import RANK_GAP_MIN, VISIBLE_SINE_MIN
 from .camera import Camera, Edges, cylinders, place_camera
 from .crossings import track_run
 from .dynamics import DynamicSimulation
@@ -40,11 +40,11 @@ from .rendered_images import LegRenderer, RenderedImages, drawing, vision
 from .result import Scatter, Servo
 from .run import AWAY, EFFORT, LIMIT, UNMEASURED, UNSEEN, Loop, Run
 
-GAIN = 0.8
+SERVO_GAIN_PER_S = 0.8
 """λ of MMT 5.1.1."""
 LASTS, NOISY_LASTS = 60.0, 16.0
 """Duration of a run in time constants 1 / λ: longest one; that with noisy measurements."""
-SETTLED = 0.5
+NOISY_RUN_SKIPPED_FRACTION = 0.5
 """Fraction of a noisy run after which its errors are counted."""
 OVER = (LIMIT, UNSEEN, UNMEASURED, AWAY)
 """Reasons after which the loop without noise does not continue a run."""
@@ -62,9 +62,9 @@ LENGTHS, VALUES = ("lengths", " mm"), ("values", "")
 
 @dataclass(frozen=True)
 class Conditions:
-    """Conditions of a servo run; :func:`servo` takes each of these by its name. Raises ``BadRequest``."""
+    """Conditions of a servo run; :func:`format_run` takes each of these by its name. Raises ``BadRequest``."""
 
-    gain: Annotated[float, option("λ of the control law (1/s).", high=1e6)] = GAIN
+    gain: Annotated[float, option("λ of the control law (1/s).", high=1e6)] = SERVO_GAIN_PER_S
     """λ of the control law (1/s)."""
     sense: Annotated[
         str,
@@ -116,15 +116,15 @@ class Conditions:
         for what, value in (("gain", self.gain), ("duration", self.duration)):
             if value is not None and not 0 < value < math.inf:
                 raise BadRequest(f"--{what}", value, "a positive number")
-        if self.duration is not None and self.duration > LONGEST_RUN:
-            raise BadRequest("--duration", self.duration, f"at most {LONGEST_RUN:g} s")
+        if self.duration is not None and self.duration > RUN_DURATION_MAX_S:
+            raise BadRequest("--duration", self.duration, f"at most {RUN_DURATION_MAX_S:g} s")
         if self.time is not None and not 0 < self.time < math.inf:
             raise BadRequest("--time", self.time, "a positive number of seconds")
-        if self.horizon > LONGEST_RUN and (self.noisy or self.dynamics):
+        if self.horizon > RUN_DURATION_MAX_S and (self.has_noise or self.dynamics):
             raise BadRequest(
                 "duration in s of a run with noise or dynamics",
                 self.horizon,
-                f"at most {LONGEST_RUN:g}",
+                f"at most {RUN_DURATION_MAX_S:g}",
                 remedy="Choose a shorter --time or a larger --gain.",
             )
 
@@ -135,14 +135,14 @@ class Conditions:
         return self.noise
 
     @property
-    def noisy(self) -> bool:
+    def has_noise(self) -> bool:
         """Return True if measurements have errors."""
         return self.sense != EXACT or self.noise is not None
 
     @property
     def horizon(self) -> float:
         """Longest duration of the run (s)."""
-        lasts = NOISY_LASTS if self.noisy or self.dynamics else LASTS
+        lasts = NOISY_LASTS if self.has_noise or self.dynamics else LASTS
         return self.time or (self.duration or 0.0) + lasts / self.gain
 
 
@@ -193,7 +193,7 @@ def servo(
     ------
     BadRequest
         Unknown name, a platform dof that is not observed, a singular pose, or a feature behind its camera.
-    PoseNotReached
+    PoseReachFailure
         Start or goal is out of reach.
     MissingExtra
         An optional package is not installed.
@@ -238,11 +238,11 @@ class ServoTask:
         conditions: Conditions = Conditions(),
         seed: int = 0,
     ) -> ServoTask:
-        """Build the task of a request; raises what :func:`servo` raises."""
-        wanted = [asked_pose(each) for each in (start, goal)]
+        """Build the task of a request; raises what :func:`format_run` raises."""
+        wanted = [parse_pose(each) for each in (start, goal)]
         setup = setup.telling(wanted)
         require_seen(setup)
-        first, last = configurations_at(setup, wanted)
+        first, last = solve_configurations(setup, wanted)
         return cls.between(setup, first, last, conditions, seed)
 
     @classmethod
@@ -285,8 +285,8 @@ class ServoTask:
     def run(self) -> Servo:
         """Simulate the run."""
         given = self.conditions
-        sensed = self.sense() if given.noisy else None
-        loop = self.loop(sensed, smooth=not given.noisy or (given.amount is not None and given.amount.bias))
+        sensed = self.sense() if given.has_noise else None
+        loop = self.loop(sensed, smooth=not given.has_noise or (given.amount is not None and given.amount.bias))
         if not given.dynamics:
             return self.result(loop.simulate(self.start, given.horizon))
         return self.result(*DynamicSimulation.of(self.setup, self.start).run(loop, given.horizon))
@@ -325,7 +325,7 @@ class ServoTask:
         setup, motion, given = self.setup, self.setup.motion, self.conditions
         still = run
         over = run.stopped in OVER
-        if (given.noisy or simulated is not None) and not over:
+        if (given.has_noise or simulated is not None) and not over:
             # the loop without noise and dynamics continues from here: its outcome is reported
             still = Loop(self.law, setup.all_samples.observation_model, FixedDirections(self.wanted)).simulate(
                 run.last, LASTS / self.law.gain
@@ -349,7 +349,7 @@ class ServoTask:
             given.depth,
             still.last,
             self.goal,
-            self._scatter(run, still.last) if given.noisy and not over else None,
+            self._scatter(run, still.last) if given.has_noise and not over else None,
             tuple(self._notes(run, still, simulated)),
         )
 
@@ -357,13 +357,13 @@ class ServoTask:
         """Yield notes on what the run ignores, and on what noise and dynamics changed."""
         model = self.goal.model
         for name, at in (("start", self.start), ("goal", self.goal)):
-            if beyond := outside(model, at.q):
+            if beyond := list_joints_beyond(model, at.q):
                 yield f"the {name} is beyond the limits of {', '.join(beyond)}"
         if self.setup.segments and (motors := len(model.actuated_indices())) < self.setup.dof:
             yield (f"{motors} motors for {self.setup.dof} platform dof: too few for the commanded motion")
         if run.stopped == EFFORT:
-            yield f"the run was stopped after {RUN_EVALUATIONS:,} configurations, at {run.times[-1]:.3g} s"
-        if self.conditions.noisy:
+            yield f"the run was stopped after {RUN_EVALUATIONS_MAX:,} configurations, at {run.times[-1]:.3g} s"
+        if self.conditions.has_noise:
             yield from self._wrong(run)
         if simulated is not None:
             motion, X = self.setup.motion, simulated @ self.start.pose(self.setup.motion.link)
@@ -390,12 +390,12 @@ class ServoTask:
         late = [
             at.pose(motion.link)
             for time, at in zip(run.times, run.configurations, strict=True)
-            if time >= SETTLED * run.times[-1]
+            if time >= NOISY_RUN_SKIPPED_FRACTION * run.times[-1]
         ]
         moved = np.array([motion.position(each) for each in late]) - motion.position(X)
         lengths, middle = np.linalg.norm(moved, axis=1), moved.mean(axis=0)
         x, y, z = map(float, motion.position(X) + middle)
-        turns = np.array([angle_of(each[:3, :3] @ X[:3, :3].T) if motion.body else 0.0 for each in late])
+        turns = np.array([compute_rotation_angle(each[:3, :3] @ X[:3, :3].T) if motion.body else 0.0 for each in late])
         return Scatter(
             float(lengths.max()),
             float(turns.max()),
@@ -408,7 +408,7 @@ class ServoTask:
 
 def require_seen(setup: ObservedRobot) -> None:
     """Raise ``BadRequest`` unless all platform dof are observed."""
-    sees_all(setup, "")
+    require_full_observation(setup, "")
     if any(member.relation.RI for member in setup.samples.members):
         raise BadRequest(
             f"{setup.robot.name}: observed links can move while the platform is fixed, so no interaction matrix exists",
@@ -451,7 +451,7 @@ def require_sight(setup: ObservedRobot, law: Law, name: str, at: ClosedConfigura
     """Raise ``BadRequest`` if an observed feature is behind its camera, or outside of its image."""
     for seen in setup.observed:
         X = at.pose(seen.seen_from or law.observation_model.reference)
-        if seen.in_front(X, at.pose(seen.link)) < SEEN_ABOVE:
+        if seen.in_front(X, at.pose(seen.link)) < VISIBLE_SINE_MIN:
             pose = setup.motion.pose(at.pose(setup.motion.link))
             raise BadRequest(
                 f"{setup.robot.name}: {seen.kind} {seen.leg} is not in front of its camera at the {name}",
@@ -465,7 +465,7 @@ def require_regular(analysis: ConfigurationAnalysis, name: str, at: ClosedConfig
     posture = analysis.classify(at)
     robot, pose = analysis.setup.robot.name, str(posture.pose)
     if posture.hidden.state == UNDECIDED:
-        raise RankUndecided(f"{robot} at the {name} {pose}", posture.hidden.gap, RANK_GAP)
+        raise UndecidedRank(f"{robot} at the {name} {pose}", posture.hidden.gap, RANK_GAP_MIN)
     if posture.hidden.state != REGULAR:
         kind = {"type1": "a Type 1", "type2": "a Type 2", "type3": "a Type 3"}.get(posture.hidden.state, "a constraint")
         raise BadRequest(f"{robot}: the {name} is {kind} singularity", pose, remedy="Choose a regular pose.")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from hrsynth.cli import execute
+from hrsynth.cli import run_command
 from parroblib import says
 from parroblib.__main__ import main
 from parroblib.entries import _sets, published_words
@@ -61,15 +61,15 @@ def test_the_command_line(tables: Path, tmp_path: Path, capsys: pytest.CaptureFi
     assert main(["build", str(tables), "2T1R", "-o", str(kept)]) == 0
     assert main(["build", str(tables), "2T1R", "-o", str(kept), "--check"]) == 0
     capsys.readouterr()
-    assert execute(["catalog", "list", "--catalog", str(kept), "--verdict", "controllable", "--json"]) == 0
+    assert run_command(["catalog", "list", "--catalog", str(kept), "--verdict", "controllable", "--json"]) == 0
     (entry,) = json.loads(capsys.readouterr().out)["entries"]
     assert (entry["key"], entry["hidden"], entry["group"]) == ("P3RRR1G1P1", "3-PiR*R", "2T1R")
-    assert execute(["catalog", "show", "P3RRR1G1P1", "--catalog", str(kept)]) == 0
+    assert run_command(["catalog", "show", "P3RRR1G1P1", "--catalog", str(kept)]) == 0
     out = capsys.readouterr().out
     assert "choices       joint 1 of each leg: 3" in out
     assert "watched link" not in out
     assert main(["robot", str(tables), "P3RRR1G1P1", "-o", str(robot)]) == 0
-    assert execute(["derive", str(robot), "--json"]) == 0
+    assert run_command(["derive", str(robot), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["verdict"] == "controllable"
     for arguments, said in (
         (["robot", str(tables), "P9", "-o", str(robot)], "not a robot of these tables"),
@@ -83,6 +83,6 @@ def test_the_command_line(tables: Path, tmp_path: Path, capsys: pytest.CaptureFi
         (["show", "P3RRR1G1P1", "--catalog", str(kept), "-o", str(robot)], "parroblib robot"),
         (["site", "--catalog", str(kept), "-o", str(tmp_path / "site")], "no pages are made"),
     ):
-        assert execute(["catalog", *command]) == 2
+        assert run_command(["catalog", *command]) == 2
         assert said in (err := capsys.readouterr().err)
         assert err.count("\n") == 1

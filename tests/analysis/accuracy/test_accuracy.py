@@ -11,19 +11,25 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from matplotlib.figure import Figure
 
-from hrsynth.analysis.accuracy.accuracy import Accuracy, accuracy, errors_at, sees_all
+from hrsynth.analysis.accuracy.accuracy import Accuracy, accuracy, compute_errors_at, require_full_observation
 from hrsynth.analysis.accuracy.error_map import Mapper
-from hrsynth.analysis.accuracy.measurement_bounds import MeasurementBounds, half_angles
-from hrsynth.analysis.accuracy.nonlinear_check import true_errors
-from hrsynth.analysis.accuracy.pose_errors import _descend, _width, error_axes, largest_by_ascent, reading
-from hrsynth.analysis.accuracy.singular_search import singular_poses
+from hrsynth.analysis.accuracy.measurement_bounds import MeasurementBounds, list_half_angles
+from hrsynth.analysis.accuracy.nonlinear_check import sample_true_errors
+from hrsynth.analysis.accuracy.pose_errors import (
+    _descend,
+    _evaluate_width,
+    compute_error_axes,
+    compute_rates_and_twists,
+    search_largest_errors,
+)
+from hrsynth.analysis.accuracy.singular_search import find_singular_poses
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.batch.pose_continuation import sweep
 from hrsynth.description import load
-from hrsynth.errors import BadRequest, HrsynthError, NoReachablePose, PoseNotReached
+from hrsynth.errors import BadRequest, HrsynthError, NoReachablePose, PoseReachFailure
 from hrsynth.geometry.vectors import Array
 from hrsynth.mechanism.pose import Grid
-from hrsynth.present.maps import _error_entries, _locus
+from hrsynth.present.maps import _list_error_entries, _locus
 from hrsynth.present.plots import MapPlane
 from hrsynth.present.show import text
 from hrsynth.present.text import runs
@@ -102,8 +108,8 @@ def test_a_map_is_the_closed_form(legs: str) -> None:
 def check_extents(setup: ObservedRobot, cones: Array) -> None:
     """The extremes are attained by the directions that are told, and no random errors in the cones do worse."""
     for at in setup.configurations[:2]:
-        errors = errors_at(setup, MeasurementBounds(cones), at)
-        rates, twists = reading(at, setup.samples.observation_model)
+        errors = compute_errors_at(setup, MeasurementBounds(cones), at)
+        rates, twists = compute_rates_and_twists(at, setup.samples.observation_model)
         inverse = np.linalg.pinv(rates, rcond=1e-7)
         rng = np.random.default_rng(1)
         tries = rng.normal(size=(400, len(cones), 3))
@@ -142,8 +148,8 @@ def test_extremes_are_attained_and_not_exceeded(robot: str) -> None:
 def test_a_bound_that_may_be_too_large_is_told_to_be_one(cones: str) -> None:
     """Of six cones the text says how far each number may be above what the errors that are told attain."""
     found = accuracy("gough_stewart", cone=cones)
-    lines = runs.accuracy(found).splitlines()
-    rates, twists = reading(found.setup.all_samples.start, found.setup.samples.observation_model)
+    lines = runs.format_accuracy(found).splitlines()
+    rates, twists = compute_rates_and_twists(found.setup.all_samples.start, found.setup.samples.observation_model)
     J = twists @ np.linalg.pinv(rates, rcond=1e-7)
     for word, extent, rows in (
         ("position", found.poses[0].position, J[:3]),
@@ -176,8 +182,8 @@ def test_samples_approach_the_linear_maxima_as_cones_shrink(robot: str) -> None:
     away = []
     for cone in (2e-3, 1e-3):
         cones = np.full(len(setup.observed), cone)
-        errors = errors_at(setup, MeasurementBounds(cones), start)
-        true = true_errors(start, observation_model, setup.motion, MeasurementBounds(cones), errors, 8)
+        errors = compute_errors_at(setup, MeasurementBounds(cones), start)
+        true = sample_true_errors(start, observation_model, setup.motion, MeasurementBounds(cones), errors, 8)
         assert true.missed == 0
         away.append(abs(true.position - errors.position.largest) / errors.position.largest)
     assert away[1] < 0.02
@@ -216,7 +222,7 @@ def test_a_grid_in_parts_is_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     grid = "x=-0.9:0.9:23,y=-0.9:0.9:23,z=-0.7"
     found = []
     for part in (10_000, 50):
-        monkeypatch.setattr("hrsynth.analysis.accuracy.error_map.PART", part)
+        monkeypatch.setattr("hrsynth.analysis.accuracy.error_map.ERROR_MAP_CHUNK_COUNT", part)
         found.append(accuracy(load("quattro_rigid"), "1,2,3", cone=0.002, grid=grid).field)
     whole, parts = found
     assert 0 < whole.reached.sum() < whole.reached.size
@@ -243,12 +249,12 @@ def test_a_grid_says_that_its_bounds_may_be_too_large(name: str, grid: str) -> N
     assert field is not None
     assert (field.spots is None) == (name == "3rps")
     assert field.gap > 1e-3
-    assert "three cones or more: upper bounds, nowhere more than" in runs.accuracy(found)
+    assert "three cones or more: upper bounds, nowhere more than" in runs.format_accuracy(found)
     starts = sweep(
         found.setup.all_samples.start, found.setup.all_samples.observation_model, field.grid, found.setup.motion
     )
     for k, at in enumerate(starts):
-        met = largest_by_ascent(at, found.setup.samples.observation_model, found.bounds)
+        met = search_largest_errors(at, found.setup.samples.observation_model, found.bounds)
         for mine, theirs in zip((field.position.flat[k], field.orientation.flat[k]), met, strict=True):
             assert mine / (1 + field.gap) * (1 - 1e-6) <= theirs <= mine * (1 + 1e-6)
 
@@ -256,7 +262,7 @@ def test_a_grid_says_that_its_bounds_may_be_too_large(name: str, grid: str) -> N
 def test_singular_poses_of_a_plane_are_singular() -> None:
     found = accuracy(load("quattro_rigid"), "1,3", cone=CONE, plane="z=-0.7", steps=61)
     assert found.field is not None
-    spots = singular_poses(found.field)
+    spots = find_singular_poses(found.field)
     assert len(spots) > 10
     x, y = map(float, spots[len(spots) // 2])
     near = accuracy(load("quattro_rigid"), "1,3", cone=CONE, at=[f"x={x!r},y={y!r},z=-0.7"])
@@ -319,7 +325,7 @@ def legend(found: Accuracy) -> list[str]:
     assert found.field is not None
     plane = MapPlane.of(found.field.grid.axes, found.setup.motion, 0.4, 1.6)
     drawn = found.field.grid.ndim == 2 and _locus(found.field, [Figure().subplots()], plane)
-    return [each.get_label() for each in _error_entries(found.field, drawn)]
+    return [each.get_label() for each in _list_error_entries(found.field, drawn)]
 
 
 @pytest.mark.parametrize(
@@ -352,7 +358,7 @@ def test_bad_requests(legs: str, cones: str | bool, options: dict, word: str) ->
 
 @pytest.mark.slow
 def test_poses_and_planes_out_of_reach() -> None:
-    with pytest.raises(PoseNotReached):
+    with pytest.raises(PoseReachFailure):
         accuracy(load("quattro"), "1,4", cone=CONE, at=["x=3"])
     with pytest.raises(NoReachablePose):
         accuracy(load("quattro"), "1,4", cone=CONE, plane="z=3")
@@ -362,9 +368,9 @@ def test_poses_and_planes_out_of_reach() -> None:
 
 def test_cones_by_link_and_by_leg() -> None:
     setup = ObservedRobot.of(load("quattro"), "1,4", samples=2)
-    sees_all(setup)
+    require_full_observation(setup)
     link = setup.observed[0].link
-    assert half_angles({link: 0.1, "4": 0.2}, setup.observed).tolist() == [0.1, 0.2]
+    assert list_half_angles({link: 0.1, "4": 0.2}, setup.observed).tolist() == [0.1, 0.2]
 
 
 def test_the_least_error_is_the_least_of_many_directions() -> None:
@@ -382,7 +388,9 @@ def test_the_least_error_is_the_least_of_many_directions() -> None:
         blocks = U * s[:, None] @ Vt
         views = rng.normal(size=(d, 20_000))
         views /= np.linalg.norm(views, axis=0)
-        assert _width(blocks, _descend(blocks)[:, None])[0] <= _width(blocks, views).min() * (1 + 1e-6)
+        assert _evaluate_width(blocks, _descend(blocks)[:, None])[0] <= _evaluate_width(blocks, views).min() * (
+            1 + 1e-6
+        )
 
 
 @pytest.mark.some(1)
@@ -391,13 +399,13 @@ def test_what_an_ascent_attains_lies_between_the_two_bounds(name: str):
     setup = ObservedRobot.of(name)
     cones = np.full(len(setup.observed), 1e-3)
     for at in (setup.all_samples.start, *setup.configurations[:4]):
-        found = largest_by_ascent(at, setup.samples.observation_model, MeasurementBounds(cones))
-        bounds = errors_at(setup, MeasurementBounds(cones), at)
+        found = search_largest_errors(at, setup.samples.observation_model, MeasurementBounds(cones))
+        bounds = compute_errors_at(setup, MeasurementBounds(cones), at)
         for bound, met in zip((bounds.position, bounds.orientation), found, strict=True):
             assert np.isinf(met) == np.isinf(bound.largest)
             if np.isfinite(met):
                 assert (1 - bound.gap) * bound.largest * (1 - 1e-6) <= met <= bound.largest * (1 + 1e-9) + 1e-15
-        axes = error_axes(at, setup.samples.observation_model, MeasurementBounds(cones))
+        axes = compute_error_axes(at, setup.samples.observation_model, MeasurementBounds(cones))
         assert (axes is None) == np.isinf(found[0])
         if axes is not None:
             assert np.linalg.norm(axes[0]) == pytest.approx(found[0], rel=1e-9)

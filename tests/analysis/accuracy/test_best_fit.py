@@ -12,14 +12,14 @@ from hypothesis import HealthCheck, assume, given, settings
 from scipy.optimize import minimize
 
 from hrsynth.analysis.accuracy.accuracy import Accuracy, accuracy
-from hrsynth.analysis.accuracy.best_fit import ENDS, FIT, Fit, best_fits, observed_values, weakest
-from hrsynth.analysis.accuracy.measurement_bounds import tilt
-from hrsynth.analysis.accuracy.nonlinear_check import _tangents
+from hrsynth.analysis.accuracy.best_fit import ENDS, FIT, Fit, compute_smallest_value, measure_values, track_best_fits
+from hrsynth.analysis.accuracy.measurement_bounds import rotate_directions
+from hrsynth.analysis.accuracy.nonlinear_check import _sample_tangents
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.batch.pose_continuation import reach
+from hrsynth.batch.pose_continuation import track_to_pose
 from hrsynth.description import load
 from hrsynth.errors import HrsynthError
-from hrsynth.geometry.vectors import Array, pose, rotation_about, unit
+from hrsynth.geometry.vectors import Array, build_pose, normalise_vector, rotate_about_axis
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.tasks import solve
 from hrsynth.mechanism.builder import Builder
@@ -55,7 +55,7 @@ def rested(P: Array, legs: list[int], way: Array, parts: int) -> tuple[Array, bo
     """The position of the best fit led there in equal parts by a general minimiser, and whether it never jumped."""
     u, smooth = directions(P, legs), True
     for part in np.linspace(0, 1, parts + 1)[1:]:
-        wanted = tilt(u, part * way)
+        wanted = rotate_directions(u, part * way)
         found = minimize(lambda x, w=wanted: 1e3 * np.sum(across(directions(x, legs), w) ** 2), P, tol=1e-12)
         smooth &= bool(np.linalg.norm(found.x - P) < 0.05)
         P = found.x
@@ -87,8 +87,8 @@ def test_what_ends_is_no_singularity() -> None:
 
 def ways(setup: ObservedRobot, at: ClosedConfiguration, cone: float, count: int, seed: int) -> list[Array]:
     rng = np.random.default_rng(seed)
-    u = np.array(observed_values(at, setup.samples.observation_model)[0])
-    return [cone * _tangents(rng, u) for _ in range(count)]
+    u = np.array(measure_values(at, setup.samples.observation_model)[0])
+    return [cone * _sample_tangents(rng, u) for _ in range(count)]
 
 
 @pytest.mark.slow
@@ -102,14 +102,16 @@ def ways(setup: ObservedRobot, at: ClosedConfiguration, cone: float, count: int,
 def test_best_fits_are_those_of_the_closed_form(legs: str, at: str, chosen: list[int]) -> None:
     """Among the ways of the samples above; where no curve of best fits goes on (13, 29), the minimiser jumps."""
     setup = ObservedRobot.of(load("quattro_rigid"), legs)
-    here = reach(setup.all_samples.start, setup.all_samples.observation_model, Pose.parse(at), setup.motion)
+    here = track_to_pose(setup.all_samples.start, setup.all_samples.observation_model, Pose.parse(at), setup.motion)
     numbers = [int(leg) - 1 for leg in legs.split(",")]
     P = setup.motion.position(here.pose(setup.motion.link))
-    u = np.array(observed_values(here, setup.samples.observation_model)[0])
+    u = np.array(measure_values(here, setup.samples.observation_model)[0])
     assert np.allclose(u, directions(P, numbers), atol=1e-9)
     drawn = ways(setup, here, math.radians(2), 30, 0)
     for way in (drawn[i] for i in chosen):
-        fit = best_fits(here, setup.samples.observation_model, lambda part, way=way: tilt(u, part * way))
+        fit = track_best_fits(
+            here, setup.samples.observation_model, lambda part, way=way: rotate_directions(u, part * way)
+        )
         found, smooth = rested(P, numbers, way, 40)
         assert fit.outcome == (FIT if smooth else ENDS)
         if smooth:
@@ -120,16 +122,16 @@ def check_fit(setup: ObservedRobot, at: ClosedConfiguration, way: Array) -> Fit:
     """A fit is where the loop rests whose desired directions are the wrong ones, and nothing next to it fits better;
     where there is none, that is no claim about the robot."""
     observation_model, link = setup.samples.observation_model, setup.motion.link
-    u = np.array(observed_values(at, observation_model)[0])
-    fit = best_fits(at, observation_model, lambda part: tilt(u, part * way))
-    assert fit.weakest <= weakest(at, observation_model) * (1 + 1e-9)
+    u = np.array(measure_values(at, observation_model)[0])
+    fit = track_best_fits(at, observation_model, lambda part: rotate_directions(u, part * way))
+    assert fit.weakest <= compute_smallest_value(at, observation_model) * (1 + 1e-9)
     if fit.outcome != FIT:
         return fit
     assert fit.reached == 1.0
-    wanted, there = tilt(u, way), fit.way[-1]
+    wanted, there = rotate_directions(u, way), fit.way[-1]
 
     def size(here: ClosedConfiguration) -> float:
-        return float(np.sum(np.cross(np.array(observed_values(here, observation_model)[0]), wanted) ** 2))
+        return float(np.sum(np.cross(np.array(measure_values(here, observation_model)[0]), wanted) ** 2))
 
     rng = np.random.default_rng(0)
     for _ in range(10):
@@ -162,7 +164,7 @@ def test_best_fits_of_random_robots(robot) -> None:
     except HrsynthError:
         assume(False)
     at = setup.configurations[0]
-    assume(weakest(at, setup.samples.observation_model) > 0.1)
+    assume(compute_smallest_value(at, setup.samples.observation_model) > 0.1)
     for way in ways(setup, at, 2e-3, 2, 1):
         check_fit(setup, at, way)
 
@@ -172,7 +174,7 @@ def test_an_arm_that_hardly_sees_one_of_its_turns_is_followed_to_the_whole_error
     """A camera on an arm sees three points and the depth of a fourth one. Gauss and Newton on the arm's product of
     exponentials, in NumPy, come to rest where the sample says, near the linear law."""
     rng = np.random.default_rng(1)
-    axes = [unit(v) for v in rng.normal(size=(6, 3))]
+    axes = [normalise_vector(v) for v in rng.normal(size=(6, 3))]
     centres = np.vstack([np.zeros(3), np.cumsum(0.3 * rng.normal(size=(5, 3)), axis=0)])
     points = [centres[-1] + [*rng.uniform(-0.5, 0.5, 2), rng.uniform(1.5, 2.5)] for _ in range(4)]
     b = Builder("arm")
@@ -192,8 +194,8 @@ def test_an_arm_that_hardly_sees_one_of_its_turns_is_followed_to_the_whole_error
     def displaced(q: Array) -> Array:
         D = np.eye(4)
         for centre, axis, angle in zip(centres, axes, q, strict=True):
-            R = rotation_about(axis, angle)
-            D = D @ pose(centre - R @ centre, R)
+            R = rotate_about_axis(axis, angle)
+            D = D @ build_pose(centre - R @ centre, R)
         return D
 
     def measured(q: Array) -> Array:
@@ -208,7 +210,10 @@ def test_an_arm_that_hardly_sees_one_of_its_turns_is_followed_to_the_whole_error
     d = linear.position.direction
     worst = (moves @ np.linalg.pinv(rates(np.zeros(6)))).T @ d
     e = np.concatenate(
-        [*(0.3 / 800 * unit(worst[2 * k : 2 * k + 2]) for k in range(3)), [0.001 / length * np.sign(worst[6])]]
+        [
+            *(0.3 / 800 * normalise_vector(worst[2 * k : 2 * k + 2]) for k in range(3)),
+            [0.001 / length * np.sign(worst[6])],
+        ]
     )
     far = []
     for sign in (1, -1):

@@ -8,16 +8,16 @@ import pytest
 from numpy.typing import NDArray
 
 import hrsynth
-from hrsynth.analysis.accuracy.accuracy import errors_at
+from hrsynth.analysis.accuracy.accuracy import compute_errors_at
 from hrsynth.analysis.accuracy.measurement_bounds import MeasurementBounds
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.errors import BadRequest
-from hrsynth.geometry.so3 import logarithm
+from hrsynth.geometry.so3 import convert_rotations_to_vectors
 from hrsynth.kinematics.chart import TangentChart
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.mechanism.noise import blurs
+from hrsynth.mechanism.noise import compute_noise_rates
 from hrsynth.mechanism.observation import Observation
-from hrsynth.mechanism.observations import kinds
+from hrsynth.mechanism.observations import list_kinds
 
 Array = NDArray[np.float64]
 
@@ -103,7 +103,7 @@ def moved(setup: ObservedRobot, at: ClosedConfiguration, there: ClosedConfigurat
     """The platform's displacement: of its point (m), its turn (rad)."""
     motion = setup.motion
     X, Y = (each.pose(motion.link) for each in (at, there))
-    turn = logarithm(Y[:3, :3] @ X[:3, :3].T) if motion.body else np.zeros(3)
+    turn = convert_rotations_to_vectors(Y[:3, :3] @ X[:3, :3].T) if motion.body else np.zeros(3)
     return motion.position(Y) - motion.position(X), turn
 
 
@@ -137,7 +137,7 @@ def test_no_wrong_measurement_does_worse_and_the_told_one_does_it(name: str, tmp
     units = sorted(frozenset().union(*(o.found_by for o in setup.observed)))
     noise = ",".join({"px": "0.003px", "m": "0.01mm", "rad": "0.001deg"}[unit] for unit in units)
     blur = MeasurementBounds.of(None, noise, setup.observed)
-    errors = errors_at(setup, blur, at)
+    errors = compute_errors_at(setup, blur, at)
     rng = np.random.default_rng(2)
     tries = rng.normal(size=(12, len(setup.observed), 2, 3))
     tries /= np.linalg.norm(tries, axis=3, keepdims=True)
@@ -167,7 +167,7 @@ def test_a_loop_whose_sensors_are_wrong_all_along_comes_to_rest_within_the_bound
         X = found.run.last.pose("platform")
         off = float(np.linalg.norm(X[:3, 3] - np.array([0.1, 0.05, 1.2])))
         assert 0.01 * errors.position.largest < off < errors.position.largest * 1.02
-        turn = float(np.linalg.norm(logarithm(X[:3, :3])))
+        turn = float(np.linalg.norm(convert_rotations_to_vectors(X[:3, :3])))
         assert 0.01 * errors.orientation.largest < turn < errors.orientation.largest * 1.02
 
 
@@ -224,7 +224,7 @@ def test_what_is_no_amount_is_refused_in_a_line(name: str, given: dict[str, str]
 
 
 @pytest.mark.some(4)
-@pytest.mark.parametrize("kind", sorted(set(kinds()) - {"encoder"}))
+@pytest.mark.parametrize("kind", sorted(set(list_kinds()) - {"encoder"}))
 def test_what_a_sensor_makes_of_noise_to_first_order(kind: str, tmp_path: Path) -> None:
     """The images of the unit balls are what the simulated sensor gives, but for the square of the noise."""
     setup = next(
@@ -242,7 +242,7 @@ def test_what_a_sensor_makes_of_noise_to_first_order(kind: str, tmp_path: Path) 
             np.linalg.norm(
                 seen.sense(value, part * given, own)
                 - value
-                - sum(A @ (part * s) for A, s in zip(blurs(seen, value, own), given, strict=False))
+                - sum(A @ (part * s) for A, s in zip(compute_noise_rates(seen, value, own), given, strict=False))
             )
             for part in (1.0, 0.1)
         ]

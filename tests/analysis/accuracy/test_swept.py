@@ -12,7 +12,7 @@ import pytest
 
 from hrsynth import accuracy, load
 from hrsynth.analysis.accuracy import swept
-from hrsynth.errors import BadRequest, BuildStopped, NoReachablePose
+from hrsynth.errors import BadRequest, BuildInterruption, NoReachablePose
 from hrsynth.mechanism.pose import Grid
 
 ASKED: dict[str, Any] = {"cone": "0.1deg", "grid": "x=-0.9:0.9:9,y=-0.9:0.9:7,z=-0.8:-0.6:3"}
@@ -134,7 +134,7 @@ def test_a_full_disk_is_told_and_nothing_is_lost(tmp_path: Path, monkeypatch: py
 
     with monkeypatch.context() as patched:
         patched.setattr(swept.os, "fsync", full)
-        with pytest.raises(BuildStopped, match=r"the sweep stopped: .*No space left"):
+        with pytest.raises(BuildInterruption, match=r"the sweep stopped: .*No space left"):
             swept_to(target, 50, monkeypatch)
     assert swept_to(target, 50, monkeypatch).before == 150
 

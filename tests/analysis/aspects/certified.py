@@ -6,12 +6,12 @@ import numpy as np
 
 from hrsynth.analysis.aspects.path import PathAnswer, PathPlanner
 from hrsynth.analysis.aspects.path_segments import WorkingModeChange
-from hrsynth.analysis.singularity.condition_check import smallest_of, weakest
+from hrsynth.analysis.singularity.condition_check import compute_smallest_value, compute_smallest_values
 from hrsynth.constraints.condition import Condition
-from hrsynth.constraints.named_vectors import unit_rows
+from hrsynth.constraints.named_vectors import normalise_rows
 from hrsynth.kinematics.configuration import ClosedConfiguration, measure
 from hrsynth.kinematics.tasks import PoseAndValuesTask, solve
-from hrsynth.tolerances import CLOSED, RANK_CUTOFF
+from hrsynth.tolerances import CLOSURE_RESIDUAL_TOL, RANK_CUTOFF_FRACTION
 
 FEWEST = 25
 """Steps on each part of a path, at least: with longer ones the solver of loops may leave a leg's working mode."""
@@ -30,7 +30,7 @@ def followed(aspects: PathPlanner, answer: PathAnswer, points: int) -> list[Clos
         if isinstance(way, WorkingModeChange):
             (seen,) = [o for o in observation_model.observations if o.leg == way.leg]
             values = measure(here.model, here.q, observation_model.reference, [seen])[2]
-            rods = unit_rows(way.rod.at(fractions))
+            rods = normalise_rows(way.rod.at(fractions))
             assert np.linalg.norm(np.cross(values[0], rods[0])) < 1e-7, "the rod is what is watched"
             held = [((seen, np.sign(values[0] @ rods[0]) * rod),) for rod in rods]
         for place, turn, measured in zip(p, R, held, strict=True):
@@ -45,7 +45,7 @@ def followed(aspects: PathPlanner, answer: PathAnswer, points: int) -> list[Clos
                 measured,
             )
             q, residual = solve(here.model, here.q, target, tolerance=1e-12)
-            assert residual <= CLOSED, "a leg does not reach"
+            assert residual <= CLOSURE_RESIDUAL_TOL, "a leg does not reach"
             here = ClosedConfiguration.of(here.model, q)
             found.append(here)
     return found
@@ -64,8 +64,10 @@ def check_certified(aspects: PathPlanner, answer: PathAnswer, points: int) -> No
     assert np.max(np.abs(end)) < 1e-7
     scene = aspects.structure.values_at(way)
     condition: Condition = aspects.condition
-    values = condition.evaluate(scene) if answer.signed else smallest_of(condition.rows(scene))
+    values = condition.evaluate(scene) if answer.signed else compute_smallest_values(condition.rows(scene))
     assert np.all(np.sign(values) == np.sign(answer.start.value))
     assert np.min(np.abs(values)) >= answer.margin - 1e-9
-    ranks = [weakest(at, aspects.setup.samples.observation_model) for at in way[:: max(1, len(way) // 20)]]
-    assert min(ranks) > RANK_CUTOFF
+    ranks = [
+        compute_smallest_value(at, aspects.setup.samples.observation_model) for at in way[:: max(1, len(way) // 20)]
+    ]
+    assert min(ranks) > RANK_CUTOFF_FRACTION

@@ -15,7 +15,7 @@ import numpy as np
 from hrsynth.analysis.modes.loci import Circle
 from hrsynth.analysis.modes.rigid import Planar
 from hrsynth.analysis.modes.solve import solve
-from hrsynth.geometry.vectors import Array, inverse, perpendicular, pose, unit
+from hrsynth.geometry.vectors import Array, build_pose, find_perpendicular, invert_pose, normalise_vector
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism import Mechanism
@@ -44,7 +44,7 @@ class SixModes:
         feet = [robot.joints[f"joint_{i}_1"].point for i in LEGS]
         knees = [robot.joints[f"joint_{i}_2"].point for i in LEGS]
         turn = X[:3, :3] @ robot.links[robot.platform].pose[:3, :3].T
-        x = unit(knees[0] - feet[0])
+        x = normalise_vector(knees[0] - feet[0])
         turns = {robot.base: 0.0, robot.platform: angle(n, x, turn @ x)}
         for i, foot, knee, end in zip(LEGS, feet, knees, ends, strict=True):
             turns |= {f"lower_{i}": angle(n, knee - foot, end - foot), f"upper_{i}": 0.0}
@@ -74,7 +74,7 @@ def six_modes(seed: int) -> Iterator[SixModes]:
             continue
         found = solve(system)
         if len(found.modes) == found.complex == 6 and found.complete:
-            X_P = inverse(system.X_plane) @ robot.links[robot.platform].pose
+            X_P = invert_pose(system.X_plane) @ robot.links[robot.platform].pose
             poses = np.array([mode.pose @ X_P for mode in found.modes])
             tips = np.array([[(mode.pose @ [*tip, 0, 1])[:3] for tip in system.tips] for mode in found.modes])
             rods = np.array([robot.joints[f"joint_{i}_3"].point - robot.joints[f"joint_{i}_2"].point for i in LEGS])
@@ -85,8 +85,8 @@ def circles(robot: Mechanism) -> Planar:
     """The circles of the tips with the forearms' directions held."""
     feet, knees, tips = ([robot.joints[f"joint_{i}_{k}"].point for i in LEGS] for k in (1, 2, 3))
     n = normal(robot)
-    x = unit(knees[0] - feet[0])
-    X = pose(tips[0], np.column_stack([x, np.cross(n, x), n]))
+    x = normalise_vector(knees[0] - feet[0])
+    X = build_pose(tips[0], np.column_stack([x, np.cross(n, x), n]))
     curves = tuple(
         Circle(foot + tip - knee, n, float(np.linalg.norm(knee - foot)))
         for foot, knee, tip in zip(feet, knees, tips, strict=True)
@@ -123,7 +123,7 @@ def determinants(instance: SixModes, tips: Array, ends: Array) -> Array:
     n, feet = normal(instance.robot), np.array([instance.robot.joints[f"joint_{i}_1"].point for i in LEGS])
     cranks = ends - feet
     cranks = cranks / np.linalg.norm(cranks, axis=2, keepdims=True)
-    x = perpendicular(n)
+    x = find_perpendicular(n)
     moments = np.cross(tips - tips[:, :1], cranks) @ n
     return np.linalg.det(np.stack([cranks @ x, cranks @ np.cross(n, x), moments], axis=2))
 
@@ -131,6 +131,6 @@ def determinants(instance: SixModes, tips: Array, ends: Array) -> Array:
 def tips_at(instance: SixModes, X: Array) -> Array:
     """The tips (n, 3, 3) at platform poses (n, 4, 4)."""
     robot = instance.robot
-    home = inverse(robot.links[robot.platform].pose)
+    home = invert_pose(robot.links[robot.platform].pose)
     tips = [X @ home @ np.append(robot.joints[f"joint_{i}_3"].point, 1.0) for i in LEGS]
     return np.stack(tips, axis=1)[:, :, :3]

@@ -16,19 +16,19 @@ from hypothesis import strategies as st
 from analysis.aspects.certified import check_certified
 from hrsynth.analysis.aspects.condition_enclosure import ConditionEnclosure, enclose_value, prove
 from hrsynth.analysis.aspects.leg_forms import LegPattern
-from hrsynth.analysis.aspects.path import BUDGET, PathPlanner, path
-from hrsynth.analysis.aspects.path_segments import StraightSegment, mode_change
+from hrsynth.analysis.aspects.path import PATH_INTERVALS_MAX, PathPlanner, path
+from hrsynth.analysis.aspects.path_segments import StraightSegment, build_mode_change
 from hrsynth.analysis.aspects.roadmap import PoseRegion, plan
 from hrsynth.analysis.aspects.verdicts import SAME, SEPARATED, UNDECIDED
-from hrsynth.analysis.singularity.condition_check import smallest_of
+from hrsynth.analysis.singularity.condition_check import compute_smallest_values
 from hrsynth.closed_forms.legs import OnCrank
 from hrsynth.constraints.vector_algebra import evaluate
 from hrsynth.description import load
-from hrsynth.errors import BadRequest, PoseNotReached
-from hrsynth.geometry.balls import balls, below, jets, mean_value_form
+from hrsynth.errors import BadRequest, PoseReachFailure
+from hrsynth.geometry.balls import bound_norm_below, enclose_intervals, evaluate_mean_value_form, make_ball_jets
 from hrsynth.geometry.vectors import Array, cross, dot, triple
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.walking import random_walk
+from hrsynth.kinematics.walking import walk_randomly
 from strategies import planar
 
 # Robots whose legs can be closed by hand: planar, five bars, translating, with six freedoms, with two halves.
@@ -62,7 +62,7 @@ def aspects_of(robot: str, observe: str | None = None) -> PathPlanner:
 def walk(robot: str, observe: str | None, count: int = 24, seed: int = 0) -> tuple[ClosedConfiguration, ...]:
     """Random configurations in the working mode of most of them."""
     aspects = aspects_of(robot, observe)
-    found = tuple(random_walk(aspects.setup.samples.start, count, seed))
+    found = tuple(walk_randomly(aspects.setup.samples.start, count, seed))
     modes = [aspects.enclosure(at).forms.modes for at in found]
     return tuple(at for at, own in zip(found, modes, strict=True) if own == max(modes, key=modes.count))
 
@@ -112,15 +112,15 @@ def test_enclosures_hold_the_values_of_all_poses_in_them(robot: str, observe: st
         way = StraightSegment.between((p[0], R[0]), (p[1], R[1]))
         low = rng.uniform(0, 1)
         high = min(1.0, low + 10 ** rng.uniform(-5, -2))
-        sure, value = reading.at(*way.at(balls([low], [high])))
+        sure, value = reading.at(*way.at(enclose_intervals([low], [high])))
         bound = reading.bounds(way, np.array([low]), np.array([high]))[0]
         inside, exact = reading.at(*way.at(rng.uniform(low, high, 50)))
         assert inside.all() or bound == 0
         assert np.all(np.abs(exact[inside]) >= bound - 1e-12)
         if sure[0]:
             assert inside.all()
-            assert np.all(np.abs(exact) >= below(value)[0] - 1e-12)
-            if reading.signed:
+            assert np.all(np.abs(exact) >= bound_norm_below(value)[0] - 1e-12)
+            if reading.has_sign:
                 assert all(value[0].overlaps(value[0] * 0 + float(each)) for each in exact)
 
 
@@ -135,7 +135,7 @@ def test_poses_decide_the_values_that_configurations_have(robot: str, observe: s
         exact = (
             aspects.condition.evaluate(scene)
             if aspects.condition.signed
-            else smallest_of(aspects.condition.rows(scene))
+            else compute_smallest_values(aspects.condition.rows(scene))
         )
         assert reached.all()
         assert value == pytest.approx(exact, abs=1e-8)
@@ -236,11 +236,11 @@ def test_poses_anywhere_on_one_side_are_joined(robot: str, observe: str | None):
     P, Q = replace(near, shift=2.5 * near.shift, turn=np.minimum(3 * near.turn, np.pi)).draw(rng, 2000)
     reached, values = reading.at(P, Q)
     proved = []
-    for side in (1, -1) if reading.signed else (1,):
+    for side in (1, -1) if reading.has_sign else (1,):
         for i, j in rng.choice(np.flatnonzero(reached & (np.sign(values) == side)), (6, 2)):
             region = PoseRegion.around(carriage, np.concatenate([P[[i, j]], p]), np.concatenate([Q[[i, j]], R]))
-            found = plan((reading, reading), region, (P[i], Q[i]), (P[j], Q[j]), seed=0, budget=BUDGET)
-            proved.append(found.proved)
+            found = plan((reading, reading), region, (P[i], Q[i]), (P[j], Q[j]), seed=0, budget=PATH_INTERVALS_MAX)
+            proved.append(found.is_proved)
             for way, after in pairwise(found.ways):
                 assert np.max(np.abs(way.end[0] - after.p)) < 1e-12
                 assert np.max(np.abs(way.end[1] - after.R)) < 1e-12
@@ -304,7 +304,7 @@ def test_a_way_that_leaves_the_workspace_is_never_proved(robot: str, observe: st
 @pytest.mark.parametrize("robot", ["3puu", "3ruu"])
 def test_a_path_crosses_the_limit_of_a_leg_into_its_other_working_mode(robot: str):
     aspects = aspects_of(robot)
-    places = list(random_walk(aspects.setup.samples.start, 150, 0))
+    places = list(walk_randomly(aspects.setup.samples.start, 150, 0))
     modes = [aspects.enclosure(at).forms.modes for at in places]
     others = [at for at, mode in zip(places, modes, strict=True) if mode != modes[0]]
     assert others
@@ -328,7 +328,7 @@ def test_a_crossing_leads_from_one_working_mode_to_the_other():
         chart, (p, R) = aspects.enclosure(at).forms, carriage.of([at])
         for number, limb in enumerate(chart.subchains):
             assert isinstance(limb, OnCrank)
-            found = mode_change(carriage, limb, number, (p[0], R[0]))
+            found = build_mode_change(carriage, limb, number, (p[0], R[0]))
             assert found is not None
             places, turns, (_, ends) = found.at(fractions)
             tips = limb.tip.value(places, turns)
@@ -351,7 +351,7 @@ def test_a_crossing_leads_from_one_working_mode_to_the_other():
 def test_random_planar_robots(words: list[str], seed: int):
     aspects = PathPlanner.of(planar(words, np.random.default_rng(seed), [{0}] * 3))
     assert isinstance(aspects.pattern, LegPattern)
-    places = list(random_walk(aspects.setup.samples.start, 4, seed))
+    places = list(walk_randomly(aspects.setup.samples.start, 4, seed))
     for start, goal in pairwise(places):
         answer, sides = aspects.join(start, goal), signs(aspects, start, goal)
         same = aspects.enclosure(start).forms.modes == aspects.enclosure(goal).forms.modes
@@ -374,11 +374,13 @@ _DYADIC = st.integers(-640, 640).map(lambda numerator: Fraction(numerator, 64))
 @given(st.lists(_DYADIC, min_size=9, max_size=9), st.integers(0, 8))
 def test_products_of_balls_hold_the_products_of_numbers(entries: list[Fraction], width: int):
     exact = np.array(entries, dtype=object).reshape(3, 3)
-    a, b, c = (balls([x - Fraction(width, 64) for x in v], [x + Fraction(width, 64) for x in v]) for v in exact)
+    a, b, c = (
+        enclose_intervals([x - Fraction(width, 64) for x in v], [x + Fraction(width, 64) for x in v]) for v in exact
+    )
     numbers = [dot(*exact[:2]).item(), triple(*exact).item(), *cross(*exact[:2])]
     for ball, number in zip([dot(a, b).item(), triple(a, b, c).item(), *cross(a, b)], numbers, strict=True):
         assert ball.contains(flint.fmpq(number.numerator, number.denominator))
-        assert below(np.array([ball]))[0] <= abs(number)
+        assert bound_norm_below(np.array([ball]))[0] <= abs(number)
 
 
 @given(st.floats(0.5, 2), st.floats(1e-6, 0.3))
@@ -386,9 +388,9 @@ def test_the_mean_value_form_holds_all_values_and_is_sharper_on_short_intervals(
     def value(x: np.ndarray) -> np.ndarray:
         return np.sqrt(x) * np.sin(x) - x * x / 2
 
-    box = balls([middle - half], [middle + half])
-    point = balls([middle], [middle])
-    form = mean_value_form(value(point), value(jets(box)), box - middle)[0]
+    box = enclose_intervals([middle - half], [middle + half])
+    point = enclose_intervals([middle], [middle])
+    form = evaluate_mean_value_form(value(point), value(make_ball_jets(box)), box - middle)[0]
     for number in value(np.linspace(middle - half, middle + half, 30)):
         assert float(form.lower()) - 1e-12 <= number <= float(form.upper()) + 1e-12
     assert half > 0.01 or form.rad() < value(box)[0].rad()
@@ -400,14 +402,14 @@ def test_the_mean_value_form_holds_all_values_and_is_sharper_on_short_intervals(
 @pytest.mark.slow
 def test_reasons_why_nothing_is_decided():
     lost = aspects_of("prrrp_parallel")
-    places = list(random_walk(lost.setup.samples.start, 2))
+    places = list(walk_randomly(lost.setup.samples.start, 2))
     answer = lost.join(*places)
     assert (answer.verdict, answer.certified) == (UNDECIDED, False)
     assert "1 of 2 freedoms is never seen: translation along y (at the zero configuration)" in answer.reason
 
     parasitic = aspects_of("3rps")
     verdicts = set()
-    places = list(random_walk(parasitic.setup.samples.start, 30))
+    places = list(walk_randomly(parasitic.setup.samples.start, 30))
     for start, goal in pairwise(places):
         answer = parasitic.join(start, goal)
         assert not answer.certified
@@ -451,7 +453,7 @@ def test_the_same_request_has_the_same_answer():
 
 def test_poses_that_there_are_not():
     robot = load("3rrr_m1")
-    with pytest.raises(PoseNotReached):
+    with pytest.raises(PoseReachFailure):
         path(robot, start="x=0", goal="x=9")
     with pytest.raises(BadRequest):
         path(robot, start="x=0", goal="z=0.1")

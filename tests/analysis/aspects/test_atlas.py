@@ -17,8 +17,8 @@ from analysis.aspects.six_modes import determinants, six_modes, tips_at
 from hrsynth.analysis.aspects import aspects as module
 from hrsynth.analysis.aspects.aspects import AspectTable, aspects
 from hrsynth.analysis.aspects.verdicts import SAME, SEPARATED, UNDECIDED
-from hrsynth.cli import execute
-from hrsynth.errors import BadRequest, PoseNotReached
+from hrsynth.cli import run_command
+from hrsynth.errors import BadRequest, PoseReachFailure
 from hrsynth.families.planar import six_poses
 from hrsynth.kinematics.configuration import measure
 from hrsynth.mechanism import Limits
@@ -109,7 +109,7 @@ def test_a_cuspidal_robot_goes_from_mode_to_mode_with_the_same_directions():
 def test_limits_that_no_path_considers_are_named():
     """A limit on one side is not enclosed along a path: what leads from mode to mode may pass it."""
     robot = hrsynth.load("quattro")
-    elbow = next(joint for joint in robot.joints.values() if joint.type.value == "R" and not joint.actuated)
+    elbow = next(joint for joint in robot.joints.values() if joint.type.value == "R" and not joint.is_actuated)
     found = hrsynth.aspects(robot.changed(joints=[replace(elbow, limits=Limits(lower=-1.0))]), "1,4")
     paths = [pair.answer for pair in found.pairs if pair.verdict == SAME and pair.answer is not None]
     assert paths
@@ -154,7 +154,7 @@ def test_a_mode_that_is_not_proved_shows_nothing():
 
 
 def test_intervals_that_are_used_up_leave_pairs_undecided(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(module, "ATLAS_INTERVALS", 1)
+    monkeypatch.setattr(module, "ASPECTS_INTERVALS_MAX", 1)
     found = aspects(six_poses())
     check_table(found)
     assert found.cuspidal is None
@@ -171,14 +171,14 @@ def test_a_continuum_has_an_empty_table_and_no_picture(capsys: pytest.CaptureFix
     with pytest.raises(BadRequest, match="continuous family"):
         hrsynth.draw(found)
     picture = tmp_path / "atlas.png"
-    assert execute(["aspects", "quattro", "--observe", "1", "-o", str(picture)]) == 0
+    assert run_command(["aspects", "quattro", "--observe", "1", "-o", str(picture)]) == 0
     assert "is not drawn" in capsys.readouterr().err
     assert not picture.exists()
 
 
 def test_json_is_the_contract(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     picture = tmp_path / "atlas.png"
-    assert execute(["aspects", "quattro", "--observe", "1,4", "--json", "-o", str(picture)]) == 0
+    assert run_command(["aspects", "quattro", "--observe", "1,4", "--json", "-o", str(picture)]) == 0
     data = json.loads(capsys.readouterr().out)
     assert (data["robot"], data["command"], data["cuspidal"]) == ("quattro", "aspects", True)
     assert data["table"][1] == [SEPARATED, SAME, SAME, UNDECIDED]
@@ -202,5 +202,5 @@ def test_a_pose_that_is_a_mode_is_reached_where_no_small_steps_lead():
 
 
 def test_what_is_no_mode_is_refused_as_before():
-    with pytest.raises(PoseNotReached, match="is not reached"):
+    with pytest.raises(PoseReachFailure, match="is not reached"):
         hrsynth.path(six_poses(), start="x=-0.064092", goal="x=0.01,y=0.5")

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from hrsynth.analysis.aspects.leg_forms import LegPattern
-from hrsynth.analysis.aspects.path import PathPlanner, leads
+from hrsynth.analysis.aspects.path import PathPlanner, is_connected_path
 from hrsynth.analysis.aspects.verdicts import SAME, SEPARATED
 from hrsynth.closed_forms.legs import ClosedFormLeg
 from hrsynth.description import load
-from hrsynth.geometry.balls import balls
-from hrsynth.kinematics.walking import random_walk
+from hrsynth.geometry.balls import enclose_intervals
+from hrsynth.kinematics.walking import walk_randomly
 from strategies import deltas, planar, pods
 
 SHIPPED = (
@@ -63,7 +63,7 @@ def test_forms_are_read_from_the_joints_and_hold_at_other_poses(name: str):
     aspects = aspects_of(name)
     pattern = known(aspects)
     assert pattern.fitted == ()
-    for at in random_walk(aspects.setup.samples.start, 5, 77):
+    for at in walk_randomly(aspects.setup.samples.start, 5, 77):
         p, R = pattern.coordinates.of([at])
         chart = pattern.forms(at)
         for limb, feature in zip(chart.subchains, pattern.carried, strict=True):
@@ -86,7 +86,7 @@ def test_what_is_fitted_is_not_certified(name: str):
     fitted = replace(pattern, subchains=tuple(replace(limb, fitted=limb.label == "2") for limb in pattern.subchains))
     aspects.__dict__["pattern"] = fitted
     met = set()
-    for start, goal in pairwise(list(random_walk(free.setup.samples.start, 12, 3))):
+    for start, goal in pairwise(list(walk_randomly(free.setup.samples.start, 12, 3))):
         told, less = free.join(start, goal), aspects.join(start, goal)
         assert told.verdict == less.verdict
         assert not less.certified
@@ -100,7 +100,7 @@ def test_what_is_fitted_is_not_certified(name: str):
 def test_ways_with_a_gap_lead_nowhere():
     """A path must begin and end at the poses asked for, in their working modes, without a gap between its parts."""
     aspects, joined = aspects_of("RRR"), 0
-    for start, goal in pairwise(list(random_walk(aspects.setup.samples.start, 8, 5))):
+    for start, goal in pairwise(list(walk_randomly(aspects.setup.samples.start, 8, 5))):
         answer = aspects.join(start, goal)
         if answer.verdict != SAME:
             continue
@@ -108,11 +108,11 @@ def test_ways_with_a_gap_lead_nowhere():
         readings = [aspects.enclosure(start), aspects.enclosure(goal)]
         p, R = known(aspects).coordinates.of([start, goal])
         ends = (p[0], R[0]), (p[1], R[1])
-        assert leads(answer.segments, *ends, readings)
-        assert not leads(answer.segments, ends[0], (p[1] + 1e-9, R[1]), readings)
-        assert not leads(answer.segments[1:], *ends, readings)
+        assert is_connected_path(answer.segments, *ends, readings)
+        assert not is_connected_path(answer.segments, ends[0], (p[1] + 1e-9, R[1]), readings)
+        assert not is_connected_path(answer.segments[1:], *ends, readings)
         other = replace(readings[1], forms=readings[1].forms.flipped(0))
-        assert not leads(answer.segments, *ends, [readings[0], other])
+        assert not is_connected_path(answer.segments, *ends, [readings[0], other])
     assert joined
 
 
@@ -124,7 +124,7 @@ def test_balls_hold_limbs_whose_numbers_were_rounded(name: str):
     start = aspects.setup.samples.start
     p, R = known(aspects).coordinates.of([start])
     for limb in aspects.enclosure(start).forms.subchains:
-        tip = limb.tip.value(np.array([balls(row, row) for row in p]), R.astype(object))
+        tip = limb.tip.value(np.array([enclose_intervals(row, row) for row in p]), R.astype(object))
         reserve, carried = limb.solve(tip, limb.mode)
         for _ in range(20):
             near = _moved(limb, rng)

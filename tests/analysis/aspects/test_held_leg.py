@@ -11,8 +11,8 @@ import pytest
 import hrsynth
 from analysis.aspects.six_modes import six_modes
 from hrsynth.analysis.aspects.aspects import AspectTable, aspects
-from hrsynth.analysis.aspects.singularity_slice import SectionPoint, SingularitySlice, section
-from hrsynth.analysis.aspects.three_cranks import ThreeCranks, mode_counts, three_cranks
+from hrsynth.analysis.aspects.singularity_slice import SectionPoint, SingularitySlice, compute_singularity_slice
+from hrsynth.analysis.aspects.three_cranks import ThreeCranks, count_modes, recognise_three_cranks
 from hrsynth.description import native
 from hrsynth.families.planar import six_poses
 from hrsynth.kinematics.configuration import ClosedConfiguration
@@ -120,7 +120,7 @@ def test_the_curve_is_where_two_modes_meet(drawn: SingularitySlice):
 def test_the_number_of_modes_changes_at_the_curve_alone(drawn: SingularitySlice):
     """Neighbouring directions with different numbers of modes are apart from the curve's image by a cell at most."""
     ticks = np.linspace(-np.pi, np.pi, 73)
-    counts = mode_counts(drawn.robot, drawn.held, ticks, ticks, 2000)
+    counts = count_modes(drawn.robot, drawn.held, ticks, ticks, 2000)
     assert set(np.unique(counts)) <= {0, 2, 4, 6}
     image = np.vstack([piece[:, 2:] for piece in drawn.curve])
     cell = ticks[1] - ticks[0]
@@ -138,7 +138,7 @@ def test_the_section_holds_all_modes_of_the_goal():
     goal = places[1]
     assert sorted(places) == [1, 2, 3, 4, 5, 6]
     first, second = np.angle(goal.rods[1:])[:, None]
-    assert mode_counts(drawn.robot, drawn.held, first, second, 4000) == [[6]]
+    assert count_modes(drawn.robot, drawn.held, first, second, 4000) == [[6]]
     for place in places.values():
         assert np.max(np.abs(place.rods - goal.rods)) < 1e-9
         assert np.abs(place.cranks) == pytest.approx(drawn.robot.cranks, abs=1e-9)
@@ -154,7 +154,7 @@ def test_modes_are_counted_where_the_second_corner_just_reaches_its_circle():
         ("1", "2", "3"), feet, cranks, rods, np.array([0, rng.uniform(0.5, 1), rng.uniform(0.3, 1) * np.exp(1j)])
     )
     first, second = np.linspace(-np.pi, np.pi, 161), np.linspace(-np.pi, np.pi, 16)
-    few, many = (mode_counts(robot, 1 + 0j, first, second, steps) for steps in (480, 6000))
+    few, many = (count_modes(robot, 1 + 0j, first, second, steps) for steps in (480, 6000))
     assert set(np.unique(many)) == {0, 2, 4, 6}
     assert np.sum(few != many) <= 1
 
@@ -166,7 +166,7 @@ def test_the_turn_of_a_mode_is_counted_as_phi_of_its_pose(axis: str):
     assert '<axis xyz="0 0 1"/>' in text
     found = aspects(native.parse(text.replace('<axis xyz="0 0 1"/>', f'<axis xyz="{axis}"/>')))
     places = [at for at in found.places if at is not None]
-    made = three_cranks(found.aspects, places)
+    made = recognise_three_cranks(found.aspects, places)
     assert not isinstance(made, str)
     turns = [at.pose(found.aspects.setup.mechanism.platform)[:3, 0] for at in places]
     phi = [np.arctan2(turn[1], turn[0]) for turn in turns]
@@ -193,7 +193,7 @@ def test_other_robots_have_no_such_section(name: str, observe: str | None, reaso
     assert isinstance(made, str)
     assert reason in made
     at: list[ClosedConfiguration] = [found.listed.goal]
-    assert three_cranks(found.aspects, at) == made
+    assert recognise_three_cranks(found.aspects, at) == made
 
 
 @pytest.mark.slow
@@ -205,7 +205,7 @@ def test_cusps_of_random_cranks_come_in_pairs_and_are_cusps(seed: int):
     rng = np.random.default_rng(seed)
     feet, corners = (size * (rng.normal(size=3) + 1j * rng.normal(size=3)) for size in (1.0, 0.7))
     robot = ThreeCranks(("1", "2", "3"), feet, rng.uniform(0.3, 1.5, 3), rng.uniform(0.3, 1.5, 3), corners - corners[0])
-    found = section(robot, np.exp(1j * rng.uniform(0, 6)))
+    found = compute_singularity_slice(robot, np.exp(1j * rng.uniform(0, 6)))
     assert len(found.cusps) % 2 == 0
     for cusp in found.cusps:
         value, first, second, third = derivatives(misses(found, cusp))

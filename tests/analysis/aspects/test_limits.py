@@ -16,7 +16,7 @@ from hrsynth.analysis.aspects.path import PathPlanner
 from hrsynth.analysis.aspects.verdicts import SAME, SEPARATED, UNDECIDED
 from hrsynth.description import load
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.walking import random_walk
+from hrsynth.kinematics.walking import walk_randomly
 from hrsynth.mechanism import JointType, Limits, Mechanism
 from strategies import planar
 
@@ -68,7 +68,7 @@ def test_a_reserve_tells_how_far_a_coordinate_is_from_its_limits(robot: str, obs
     assert isinstance(aspects.pattern, LegPattern)
     assert {bound.joint for bound in aspects.pattern.bounds} == set(single(aspects.setup.mechanism))
     beyond = 0
-    for at in random_walk(aspects.setup.samples.start, 12, 1):
+    for at in walk_randomly(aspects.setup.samples.start, 12, 1):
         chart = aspects.enclosure(at).forms
         reserves = chart.at(*aspects.pattern.coordinates.of([at])).reach_margins[0, len(chart.subchains) :]
         for bound, reserve in zip(chart.bounds, reserves, strict=True):
@@ -106,7 +106,7 @@ def furthest(path: list[ClosedConfiguration], joints: list[str]) -> tuple[str, f
 def test_paths_are_led_around_the_limits_that_others_pass(robot: Mechanism):
     """Limits that a path without them leaves: another path keeps to them, or none is found."""
     free = PathPlanner.of(robot)
-    places = list(random_walk(free.setup.samples.start, 40, 1))
+    places = list(walk_randomly(free.setup.samples.start, 40, 1))
     led = []
     for one, other in zip(places[:20:2], places[::-3], strict=False):
         plain = free.join(one, other)
@@ -129,7 +129,7 @@ def test_paths_are_led_around_the_limits_that_others_pass(robot: Mechanism):
 def test_a_pose_beyond_a_limit_is_named_and_still_separated():
     robot = load("3rrr_m1")
     free = PathPlanner.of(robot)
-    places = list(random_walk(free.setup.samples.start, 120, 0))
+    places = list(walk_randomly(free.setup.samples.start, 120, 0))
     values = [coordinates(at, "elbow_1") for at in places]
     low, high = np.quantile(values, [0.2, 0.8])
     aspects = PathPlanner.of(with_limits(robot, {"elbow_1": Limits(low, high)}))
@@ -154,7 +154,7 @@ def test_a_rod_may_pass_length_zero_unless_it_is_limited(room: float | None):
     )
     near = [
         at
-        for at in random_walk(aspects.setup.samples.start, 150, 1)
+        for at in walk_randomly(aspects.setup.samples.start, 150, 1)
         if all(abs(coordinates(at, name)) < 0.24 for name in slides)
     ]
     values = aspects.condition.evaluate(aspects.structure.values_at(near))
@@ -167,7 +167,7 @@ def test_a_rod_may_pass_length_zero_unless_it_is_limited(room: float | None):
 @pytest.mark.parametrize("limits", [Limits(-4.0, 4.0), Limits(lower=-1.0)])
 def test_limits_that_are_not_considered_are_named(limits: Limits):
     aspects = PathPlanner.of(with_limits(load("3rrr_m1"), {"elbow_1": limits, "elbow_2": Limits(-3.0, 3.0)}))
-    places = list(random_walk(aspects.setup.samples.start, 2, 0))
+    places = list(walk_randomly(aspects.setup.samples.start, 2, 0))
     answer = aspects.join(places[0], places[0])
     assert (answer.verdict, answer.limits) == (SAME, ("elbow_2",))
     assert answer.not_proved.startswith("limits of joints elbow_1; ")
@@ -176,7 +176,7 @@ def test_limits_that_are_not_considered_are_named(limits: Limits):
 def test_a_pose_on_a_limit_is_not_called_beyond_it():
     """A joint that rests on its stop where the path begins: nothing is proved, and it is not said to be beyond it."""
     aspects = PathPlanner.of(with_limits(load("3rrr_m1"), {"elbow_1": Limits(0.0, 1.0)}))
-    others = random_walk(aspects.setup.samples.start, 40, 0)
+    others = walk_randomly(aspects.setup.samples.start, 40, 0)
     goal = next(at for at in others if 0.01 < coordinates(at, "elbow_1") < 0.9)
     answer = aspects.join(aspects.setup.samples.start, goal)
     assert answer.verdict == UNDECIDED

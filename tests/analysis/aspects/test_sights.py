@@ -13,12 +13,12 @@ from hrsynth.analysis.aspects.condition_enclosure import ConditionEnclosure
 from hrsynth.analysis.aspects.leg_forms import LegPattern
 from hrsynth.analysis.aspects.path import PathAnswer, PathPlanner
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.analysis.singularity.condition_check import smallest_of
-from hrsynth.constraints.condition import Named
+from hrsynth.analysis.singularity.condition_check import compute_smallest_values
+from hrsynth.constraints.condition import NamedCondition
 from hrsynth.description import load
-from hrsynth.geometry.balls import balls, below
-from hrsynth.geometry.so3 import exponential
-from hrsynth.geometry.vectors import pose
+from hrsynth.geometry.balls import bound_norm_below, enclose_intervals
+from hrsynth.geometry.so3 import convert_vectors_to_rotations
+from hrsynth.geometry.vectors import build_pose
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.cameras import CameraObservation
 
@@ -56,13 +56,15 @@ def test_what_is_enclosed_is_the_condition_of_the_configurations(name: str, robo
     """In numbers, and in balls, which hold the numbers."""
     given = body(tmp_path) if robot == "body" else load(robot)
     aspects = PathPlanner.of(ObservedRobot.of(given, camera=EYE, sensor=SETS[name], samples=5))
-    assert isinstance(aspects.condition, Named)
+    assert isinstance(aspects.condition, NamedCondition)
     assert isinstance(aspects.pattern, LegPattern), aspects.pattern
     assert not aspects.pattern.fitted
     at = aspects.members
     scene = aspects.structure.values_at(at)
     expected = (
-        aspects.condition.evaluate(scene) if aspects.condition.signed else smallest_of(aspects.condition.rows(scene))
+        aspects.condition.evaluate(scene)
+        if aspects.condition.signed
+        else compute_smallest_values(aspects.condition.rows(scene))
     )
     p, R = aspects.pattern.coordinates.of(at)
     for i, each in enumerate(at):
@@ -71,12 +73,15 @@ def test_what_is_enclosed_is_the_condition_of_the_configurations(name: str, robo
         assert reached.all()
         assert value[0] == pytest.approx(expected[i], rel=1e-8, abs=1e-10)
         sure, wide = enclosure.at(
-            *(np.array([balls([x], [x])[0] for x in part.ravel()]).reshape(1, *part.shape) for part in (p[i], R[i]))
+            *(
+                np.array([enclose_intervals([x], [x])[0] for x in part.ravel()]).reshape(1, *part.shape)
+                for part in (p[i], R[i])
+            )
         )
         assert sure.all()
-        bound = below(wide)[0]
+        bound = bound_norm_below(wide)[0]
         assert 0 <= bound <= abs(value[0]) * (1 + 1e-9)
-        assert bound > 0.9 * abs(value[0]) or not enclosure.signed
+        assert bound > 0.9 * abs(value[0]) or not enclosure.has_sign
 
 
 def camera() -> Array:
@@ -93,7 +98,7 @@ def image_sign(view: Array, X: Array) -> float:
     """The sign of the determinant of the image coordinates' derivatives, on the sphere of rays: Z ≠ 0 apart."""
 
     def seen(step: Array) -> Array:
-        turned = X @ pose(step[:3], exponential(step[3:]))
+        turned = X @ build_pose(step[:3], convert_vectors_to_rotations(step[3:]))
         p = (np.linalg.inv(view) @ turned @ np.hstack([PLACES, np.ones((3, 1))]).T)[:3]
         return np.concatenate([p[0] / p[2], p[1] / p[2]])
 
@@ -121,7 +126,7 @@ def test_the_sign_of_the_condition_is_that_of_a_determinant(name: str, tmp_path:
     coordinates, enclosure = aspects.pattern.coordinates, aspects.enclosure(setup.all_samples.start)
     rng, view = np.random.default_rng(0), camera()
     p = rng.normal(size=(300, 3)) * 0.5 + np.array([0.1, 0.05, 0.3])
-    R = exponential(rng.normal(size=(300, 3)) * 2)
+    R = convert_vectors_to_rotations(rng.normal(size=(300, 3)) * 2)
     found = np.sign(enclosure.at(p, R)[1])
     frames = [coordinates.frame(a, b) for a, b in zip(p, R, strict=True)]
     expected = np.array([image_sign(view, X) if name == "points" else wrench_sign(setup, X) for X in frames])
@@ -168,7 +173,7 @@ def test_opposite_signs_separate(tmp_path: Path) -> None:
     for _ in range(40):
         x, y, z = rng.uniform(-0.3, 0.3, 2).tolist() + [float(rng.uniform(0.8, 1.4))]
         text = f"x={x:.3f},y={y:.3f},z={z:.3f},rpy=0/0/0"
-        signs.setdefault(wrench_sign(setup, pose([round(x, 3), round(y, 3), round(z, 3)])), text)
+        signs.setdefault(wrench_sign(setup, build_pose([round(x, 3), round(y, 3), round(z, 3)])), text)
     assert len(signs) == 2
     found = hrsynth.path(setup, start=signs[1.0], goal=signs[-1.0])
     assert (found.verdict, found.certified) == ("separated", True)

@@ -9,7 +9,7 @@ import pytest
 
 from analysis.aspects.certified import check_certified
 from analysis.aspects.six_modes import LEGS, SixModes, determinants, six_modes, tips_at
-from hrsynth.analysis.aspects.path import BUDGET, PathAnswer, PathPlanner
+from hrsynth.analysis.aspects.path import PATH_INTERVALS_MAX, PathAnswer, PathPlanner
 from hrsynth.analysis.aspects.path_segments import WorkingModeChange
 from hrsynth.analysis.aspects.verdicts import SAME, SEPARATED, UNDECIDED
 from hrsynth.geometry.vectors import Array
@@ -84,7 +84,7 @@ def check_instance(instance: SixModes, points: int, followed: int) -> tuple[int,
     decided = 0
     for (i, j), answer in answers.items():
         assert abs(answer.start.value) == pytest.approx(abs(values[i]), abs=1e-9)
-        assert answer.boxes <= BUDGET
+        assert answer.boxes <= PATH_INTERVALS_MAX
         if values[i] * values[j] < 0:
             assert (answer.verdict, answer.certified) == (SEPARATED, True)
             continue

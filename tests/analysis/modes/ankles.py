@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hrsynth.geometry.vectors import Array, perpendicular, rotation_about, unit
+from hrsynth.geometry.vectors import Array, find_perpendicular, normalise_vector, rotate_about_axis
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 
@@ -22,13 +22,13 @@ def ankle(
     ``offset``: the axes do not meet then.
     """
     rng = np.random.default_rng(seed)
-    tilt = rotation_about(rng.normal(size=3), rng.uniform(0, 3))
+    tilt = rotate_about_axis(rng.normal(size=3), rng.uniform(0, 3))
 
     def near(*at: float, by: float = 0.05) -> Array:
         return np.asarray(tilt @ (np.array(at) + by * rng.normal(size=3)))
 
     centre = near(0, 0, 0)
-    first, second = unit(near(0, 1, 0, by=0.2)), unit(near(1, 0, 0, by=0.2))
+    first, second = normalise_vector(near(0, 1, 0, by=0.2)), normalise_vector(near(1, 0, 0, by=0.2))
     lower = centre + np.random.default_rng(seed).normal(size=3) * offset
     b, rods = Builder("ankle"), list[Rod]()
     b.link("shank")
@@ -39,14 +39,23 @@ def ankle(
         b.joint("roll", "R", "cross", "foot", at=lower, axis=second)
     else:
         b.joint(
-            "ankle", "U", "shank", "foot", at=centre, axis=first, axis2=unit(np.cross(np.cross(first, second), first))
+            "ankle",
+            "U",
+            "shank",
+            "foot",
+            at=centre,
+            axis=first,
+            axis2=normalise_vector(np.cross(np.cross(first, second), first)),
         )
-        second = unit(np.cross(np.cross(first, second), first))
+        second = normalise_vector(np.cross(np.cross(first, second), first))
     for leg, side in (("1", 0.06), ("2", -0.06)):
         motor, end = near(-0.05, side, 0.3), near(-0.06, side, -0.04)
         ball = motor if kind == "SPU" else motor + near(-0.06, 0, 0)
-        along = unit(end - ball)
-        axes = {"axis": perpendicular(along), "axis2": unit(np.cross(along, perpendicular(along)))}
+        along = normalise_vector(end - ball)
+        axes = {
+            "axis": find_perpendicular(along),
+            "axis2": normalise_vector(np.cross(along, find_perpendicular(along))),
+        }
         b.link(f"crank_{leg}", at=motor)
         b.link(f"rod_{leg}", at=ball)
         if kind == "SPU":
@@ -55,7 +64,13 @@ def ankle(
             b.joint(f"end_{leg}", "U", f"rod_{leg}", "foot", at=end, loop=True, **axes)
         else:
             b.joint(
-                f"crank_{leg}", "R", "shank", f"crank_{leg}", at=motor, axis=unit(near(0, 1, 0, by=0.2)), motor=True
+                f"crank_{leg}",
+                "R",
+                "shank",
+                f"crank_{leg}",
+                at=motor,
+                axis=normalise_vector(near(0, 1, 0, by=0.2)),
+                motor=True,
             )
             up, down = ({}, axes) if kind == "RSU" else (axes, {})
             b.joint(f"ball_{leg}", kind[1], f"crank_{leg}", f"rod_{leg}", at=ball, **up)
@@ -76,7 +91,7 @@ def carried(word: str, seed: int, on: tuple[int, str] | None = None) -> Mechanis
     b.link("base")
     for link, at in zip(links[1:], places, strict=True):
         b.link(link, at=at)
-    axes = [unit(rng.normal(size=3)) for _ in word]
+    axes = [normalise_vector(rng.normal(size=3)) for _ in word]
     for k, kind in enumerate(word):
         b.joint(f"joint_{k}", kind, links[k], links[k + 1], at=places[k], axis=axes[k])
     for k in range(len(word)):
@@ -85,8 +100,8 @@ def carried(word: str, seed: int, on: tuple[int, str] | None = None) -> Mechanis
             foot = places[0] + 0.4 * axes[0]
         if on == (k, "end"):
             end = places[-1] + 0.2 * axes[-1]
-        along = unit(end - foot)
-        across = perpendicular(along)
+        along = normalise_vector(end - foot)
+        across = find_perpendicular(along)
         b.link(f"tube_{k}", at=foot)
         b.link(f"rod_{k}", at=end)
         b.joint(f"ball_{k}", "S", "base", f"tube_{k}", at=foot)
@@ -107,7 +122,9 @@ def counted(joint: tuple[Array, Array, Array, Array], rods: list[Rod]) -> tuple[
         angles = 2 * np.pi * np.arange(3) / 3
         rod = [
             [
-                centre + rotation_about(a, alpha) @ (lower + rotation_about(c, beta) @ (end - lower) - centre) - ball
+                centre
+                + rotate_about_axis(a, alpha) @ (lower + rotate_about_axis(c, beta) @ (end - lower) - centre)
+                - ball
                 for beta in angles
             ]
             for alpha in angles

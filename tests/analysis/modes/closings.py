@@ -12,8 +12,8 @@ import numpy as np
 
 from hrsynth.analysis.modes.assembly_mode import AssemblyMode
 from hrsynth.analysis.modes.modes import AssemblyModes
-from hrsynth.analysis.observed import motors
-from hrsynth.geometry.vectors import Array, inverse
+from hrsynth.analysis.observed import build_motor_model
+from hrsynth.geometry.vectors import Array, invert_pose
 from hrsynth.kinematics.configuration import ClosedConfiguration, measure
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.kinematics.tasks import solve
@@ -41,7 +41,7 @@ class Held:
 
 def asked(listed: AssemblyModes) -> ObservationModel:
     """What is held."""
-    return motors(listed.setup) if listed.kind == "real" else listed.setup.samples.observation_model
+    return build_motor_model(listed.setup) if listed.kind == "real" else listed.setup.samples.observation_model
 
 
 def closings(listed: AssemblyModes, starts: int, seed: int = 0) -> list[ClosedConfiguration]:
@@ -124,7 +124,7 @@ def compared(listed: AssemblyModes, starts: int, seed: int = 0) -> Comparison:
 def motor_places(mechanism: Mechanism, pose_of: dict[str, Array]) -> list[Array]:
     """The pose of each driven joint's successor in the frame of its predecessor: what an encoder feels."""
     return [
-        inverse(pose_of[joint.predecessor]) @ pose_of[joint.successor]
+        invert_pose(pose_of[joint.predecessor]) @ pose_of[joint.successor]
         for joint in mechanism.joints.values()
-        if joint.actuated
+        if joint.is_actuated
     ]

@@ -13,7 +13,7 @@ import numpy as np
 from flint import arb, arb_mat, ctx
 from scipy.optimize import least_squares
 
-from hrsynth.geometry.vectors import Array, pose, rotation_about
+from hrsynth.geometry.vectors import Array, build_pose, rotate_about_axis
 
 BITS = 220
 STEP = 1e-25
@@ -101,11 +101,11 @@ class File:
     def _along(self, joints: Sequence[Any], q: Mapping[str, float], X: Array) -> Array:
         for name, _, _, origin, axis, kind in joints:
             a = np.array([float(c) for c in axis])
-            X = X @ pose([float(c) for c in origin])
+            X = X @ build_pose([float(c) for c in origin])
             if kind == "prismatic":
-                X = X @ pose(a * q[name])
+                X = X @ build_pose(a * q[name])
             elif kind != "fixed":
-                X = X @ pose((0, 0, 0), rotation_about(a, q[name]))
+                X = X @ build_pose((0, 0, 0), rotate_about_axis(a, q[name]))
         return X
 
     def closes(self, q: Mapping[str, Any]) -> list[Any]:

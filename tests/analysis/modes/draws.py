@@ -9,8 +9,8 @@ import numpy as np
 
 from hrsynth.analysis.modes.loci import Circle, Line, Plane, Point, Reach, Sphere
 from hrsynth.analysis.modes.rigid import Planar, Spatial
-from hrsynth.analysis.modes.translating import Articulated, Translating
-from hrsynth.geometry.vectors import Array, pose, rotation_about, unit
+from hrsynth.analysis.modes.translating import ArticulatedPlatform, TranslatingPlatform
+from hrsynth.geometry.vectors import Array, build_pose, normalise_vector, rotate_about_axis
 from strategies import random_rotation
 
 Rng = np.random.Generator
@@ -29,25 +29,25 @@ def through(rng: Rng, kind: str, tip: Array, normal: Array | None = None) -> Rea
     plane E through it."""
     if kind == "P":
         return Point(tip)
-    drawn = unit(rng.normal(size=3))
+    drawn = normalise_vector(rng.normal(size=3))
     if kind == "S":
         radius = rng.uniform(0.5, 1.5)
         return Sphere(tip - radius * drawn, radius)
     if kind == "E":
         return Plane(tip + np.cross(drawn, rng.normal(size=3)), drawn)
     if kind == "L":
-        along = drawn if normal is None else unit(np.cross(normal, drawn))
+        along = drawn if normal is None else normalise_vector(np.cross(normal, drawn))
         return Line(tip - along * rng.normal(), along)
     axis = drawn if normal is None else normal
-    spoke = unit(np.cross(axis, rng.normal(size=3)))
+    spoke = normalise_vector(np.cross(axis, rng.normal(size=3)))
     radius = rng.uniform(0.3, 1.5)
     return Circle(tip - radius * spoke, axis, radius)
 
 
 def planar(rng: Rng, kinds: str) -> Draw:
-    X = pose(rng.normal(size=3), random_rotation(rng))
+    X = build_pose(rng.normal(size=3), random_rotation(rng))
     tips = rng.normal(scale=0.6, size=(len(kinds), 2))
-    goal = X @ pose((*rng.normal(size=2), 0.0), rotation_about((0, 0, 1), rng.uniform(-3, 3)))
+    goal = X @ build_pose((*rng.normal(size=2), 0.0), rotate_about_axis((0, 0, 1), rng.uniform(-3, 3)))
     curves = [
         through(rng, kind, goal[:3, 3] + goal[:3, :2] @ tip, X[:3, 2]) for kind, tip in zip(kinds, tips, strict=True)
     ]
@@ -55,7 +55,7 @@ def planar(rng: Rng, kinds: str) -> Draw:
 
 
 def spatial(rng: Rng, kinds: str) -> Draw:
-    goal = pose(rng.normal(size=3), random_rotation(rng))
+    goal = build_pose(rng.normal(size=3), random_rotation(rng))
     tips = rng.normal(scale=0.6, size=(len(kinds), 3))
     curves = [through(rng, kind, goal[:3, 3] + goal[:3, :3] @ tip) for kind, tip in zip(kinds, tips, strict=True)]
     return Draw(Spatial(tuple(curves), tips), goal)
@@ -63,17 +63,17 @@ def spatial(rng: Rng, kinds: str) -> Draw:
 
 def translating(rng: Rng, kinds: str, in_plane: bool = False) -> Draw:
     """With ``in_plane`` the paths of p lie in one plane."""
-    p, n = rng.normal(size=3), unit(rng.normal(size=3))
+    p, n = rng.normal(size=3), normalise_vector(rng.normal(size=3))
     tips = rng.normal(scale=0.6, size=(len(kinds), 3))
     curves = [through(rng, kind, p + tip, n if in_plane else None) for kind, tip in zip(kinds, tips, strict=True)]
-    return Draw(Translating(tuple(curves), tips), pose(p))
+    return Draw(TranslatingPlatform(tuple(curves), tips), build_pose(p))
 
 
 def articulated(rng: Rng, kinds: str, parallel: tuple[int, ...] = ()) -> Draw:
     """One leg on each body; the circles ``parallel`` (0 and 1 the legs', 2 the slide) lie in parallel planes."""
     p = rng.normal(size=3)
     tips = rng.normal(scale=0.4, size=(len(kinds), 3))
-    normals = [unit(rng.normal(size=3)) for _ in range(3)]
+    normals = [normalise_vector(rng.normal(size=3)) for _ in range(3)]
     for k in parallel:
         normals[k] = normals[parallel[0]]
     slide = Circle(rng.normal(scale=0.1, size=3), normals[2], rng.uniform(0.3, 1.5))
@@ -81,13 +81,13 @@ def articulated(rng: Rng, kinds: str, parallel: tuple[int, ...] = ()) -> Draw:
     curves = [
         through(rng, kind, tip, n if kind == "C" else None) for kind, tip, n in zip(kinds, at, normals, strict=False)
     ]
-    return Draw(Articulated(tuple(curves), tips, (0, 1), slide), pose(p))
+    return Draw(ArticulatedPlatform(tuple(curves), tips, (0, 1), slide), build_pose(p))
 
 
 def on_two_bodies(rng: Rng, kinds: tuple[str, str], straight: bool = False) -> Draw:
     """The legs of each body; the bodies translate, the second on a circle about the first, or straight."""
     p = rng.normal(size=3)
-    centre, axis = rng.normal(scale=0.1, size=3), unit(rng.normal(size=3))
+    centre, axis = rng.normal(scale=0.1, size=3), normalise_vector(rng.normal(size=3))
     slide = Line(centre, axis) if straight else Circle(centre, axis, rng.uniform(0.3, 1.5))
     bodies = tuple(body for body in (0, 1) for _ in kinds[body])
     origins = np.array([p, p + slide.at(rng.uniform(-3, 3))])[list(bodies)]
@@ -95,7 +95,7 @@ def on_two_bodies(rng: Rng, kinds: tuple[str, str], straight: bool = False) -> D
     curves = [
         through(rng, kind, origin + tip) for kind, origin, tip in zip(kinds[0] + kinds[1], origins, tips, strict=True)
     ]
-    return Draw(Articulated(tuple(curves), tips, bodies, slide), pose(p))
+    return Draw(ArticulatedPlatform(tuple(curves), tips, bodies, slide), build_pose(p))
 
 
 class Family(NamedTuple):
@@ -159,7 +159,7 @@ SURFACES = {
 
 def six_rods(rng: Rng, platform: str, base: str, noise: float = 0.0) -> Draw:
     """Six rods between balls; rods with the same letter share one, but for ``noise``."""
-    goal = pose(rng.normal(size=3), random_rotation(rng))
+    goal = build_pose(rng.normal(size=3), random_rotation(rng))
     sides = [scale * rng.normal(size=(6, 3)) for scale in (1.0, 2.0)]
     tips, centres = (
         np.array([side["ABCDEF".index(letter)] for letter in letters]) + noise * rng.normal(size=(6, 3))

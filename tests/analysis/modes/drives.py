@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hrsynth.geometry.vectors import Array, inverse, rotation_about
+from hrsynth.geometry.vectors import Array, invert_pose, rotate_about_axis
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 from oracle import ALL, SQUARE, Oracle, Rows, exponential
@@ -14,7 +14,7 @@ def driven(drive: str, seed: int, watched: str = "rod_1") -> Mechanism:
     """3-RRR in a tilted plane; the first leg's crank is driven through a ``four-bar``, by a ``strut`` R-P-R of which P
     has the motor, or by a crank and a ``ball rod`` beside the plane."""
     rng = np.random.default_rng(seed)
-    T = rotation_about(rng.normal(size=3), rng.uniform(0, 3))
+    T = rotate_about_axis(rng.normal(size=3), rng.uniform(0, 3))
     n = T[:, 2]
 
     def flat(size: float) -> Array:
@@ -26,7 +26,7 @@ def driven(drive: str, seed: int, watched: str = "rod_1") -> Mechanism:
     for leg in (1, 2, 3):
         turn = 2.1 * leg + rng.normal(scale=0.2)
         out = T @ [np.cos(turn), np.sin(turn), 0]
-        A, B = 1.5 * out, middle + 0.4 * rotation_about(n, 0.3) @ out
+        A, B = 1.5 * out, middle + 0.4 * rotate_about_axis(n, 0.3) @ out
         E = A + flat(0.5)
         b.link(f"crank_{leg}", at=A)
         b.link(f"rod_{leg}", at=E)
@@ -62,9 +62,9 @@ def closings(robot: Mechanism, starts: int, seed: int) -> list[Array]:
     n, zero = robot.joints["shoulder_1"].axis, oracle.zero()
     rows = Rows() + oracle.rows
     for joint in robot.joints.values():
-        if joint.actuated:
+        if joint.is_actuated:
             i, j = oracle.index[joint.predecessor], oracle.index[joint.successor]
-            rows.tie(i, j, np.eye(4), inverse(zero[j]) @ zero[i], ALL, SQUARE)
+            rows.tie(i, j, np.eye(4), invert_pose(zero[j]) @ zero[i], ALL, SQUARE)
     found = []
     for _ in range(starts):
         state = oracle.zero()

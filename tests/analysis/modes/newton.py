@@ -12,7 +12,7 @@ import numpy as np
 from hrsynth.analysis.modes.constrained_platform import System
 from hrsynth.analysis.modes.loci import Circle, Curve, Line
 from hrsynth.analysis.modes.rigid import Planar, Spatial
-from hrsynth.analysis.modes.translating import Articulated, Translating
+from hrsynth.analysis.modes.translating import ArticulatedPlatform, TranslatingPlatform
 
 Batch = Any
 """A complex array whose first axis counts the starts."""
@@ -33,7 +33,7 @@ def on_curve(curve: Curve, tip: Batch, plane: Any = None) -> list[Batch]:
 
 def unknowns(system: System) -> int:
     """How many numbers a pose is given by here."""
-    return {Planar: 4, Spatial: 7, Translating: 3, Articulated: 5}[type(system)]
+    return {Planar: 4, Spatial: 7, TranslatingPlatform: 3, ArticulatedPlatform: 5}[type(system)]
 
 
 def equations(system: System, v: Batch) -> Batch:
@@ -52,7 +52,7 @@ def equations(system: System, v: Batch) -> Batch:
             turned = (w * w - (u * u).sum(axis=1, keepdims=True)) * b + 2 * (u @ b)[:, None] * u
             rows += on_curve(curve, v[:, :3] + turned + 2 * w * np.cross(u, b))
         rows.append((v[:, 3:] ** 2).sum(axis=1) - 1)
-    elif isinstance(system, Articulated):
+    elif isinstance(system, ArticulatedPlatform):
         slide = system.slide
         moved = (
             v[:, :3]
@@ -63,7 +63,7 @@ def equations(system: System, v: Batch) -> Batch:
             rows += on_curve(curve, (moved if body else v[:, :3]) + b)
         rows.append((v[:, 3:] ** 2).sum(axis=1) - 1)
     else:
-        assert isinstance(system, Translating)
+        assert isinstance(system, TranslatingPlatform)
         for curve, b in zip(system.curves, system.tips, strict=True):
             rows += on_curve(curve, v + b)
     return np.stack(rows, axis=1)

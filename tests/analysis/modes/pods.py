@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrsynth.geometry.vectors import Array, rotation_about, unit
+from hrsynth.geometry.vectors import Array, normalise_vector, rotate_about_axis
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 
@@ -36,7 +36,7 @@ def pods(words: Sequence[str], seed: int) -> tuple[Mechanism, list[Serial]]:
     The last link before the platform is watched: along its P, or from joint to joint.
     """
     rng = np.random.default_rng(seed)
-    tilt = rotation_about(rng.normal(size=3), rng.uniform(0, 3))
+    tilt = rotate_about_axis(rng.normal(size=3), rng.uniform(0, 3))
     middle = tilt @ (rng.normal(scale=0.3, size=3) + [0, 0, 1])
     b, legs = Builder("pods"), list[Serial]()
     b.link("base")
@@ -48,11 +48,11 @@ def pods(words: Sequence[str], seed: int) -> tuple[Mechanism, list[Serial]]:
         links = ["base", *(f"link_{leg}_{k}" for k in range(1, len(word))), "platform"]
         for name, point in zip(links[1:-1], at, strict=False):
             b.link(name, at=point)
-        joints, direction = list[tuple[str, Array, Array]](), unit(at[-1] - at[-2])
+        joints, direction = list[tuple[str, Array, Array]](), normalise_vector(at[-1] - at[-2])
         for k, (letter, point) in enumerate(zip(word, at, strict=True)):
             near = tip - foot if letter in "PC" else np.zeros(3)
-            axis = unit(near + rng.normal(scale=0.3, size=3))
-            second = unit(np.cross(axis, rng.normal(size=3)))
+            axis = normalise_vector(near + rng.normal(scale=0.3, size=3))
+            second = normalise_vector(np.cross(axis, rng.normal(size=3)))
             axes = {"S": {}, "U": {"axis": axis, "axis2": second}}.get(letter, {"axis": axis})
             b.joint(
                 f"joint_{leg}_{k}",

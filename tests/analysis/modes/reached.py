@@ -10,7 +10,7 @@ import numpy as np
 from analysis.modes.draws import Draw
 from hrsynth.analysis.modes.loci import Circle, Line
 from hrsynth.analysis.modes.solve import solve
-from hrsynth.geometry.vectors import Array, perpendicular, unit
+from hrsynth.geometry.vectors import Array, find_perpendicular, normalise_vector
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 
@@ -26,7 +26,7 @@ def three_rrr(drawn: Draw, rng: Rng) -> Mechanism:
     for leg, (circle, tip) in enumerate(zip(drawn.system.curves, drawn.system.tips, strict=True), 1):
         assert isinstance(circle, Circle)
         B = drawn.goal[:3, 3] + drawn.goal[:3, :2] @ tip
-        rod = rng.uniform(0.5, 1.5) * unit(np.cross(n, rng.normal(size=3)))
+        rod = rng.uniform(0.5, 1.5) * normalise_vector(np.cross(n, rng.normal(size=3)))
         A, E = circle.centre - rod, B - rod
         b.link(f"crank_{leg}", at=A)
         b.link(f"rod_{leg}", at=E)
@@ -47,13 +47,13 @@ def six_ups(drawn: Draw, rng: Rng) -> Mechanism:
     tips = np.array([*drawn.system.tips, *rng.normal(scale=0.6, size=(3, 3))])
     at = drawn.goal[:3, 3] + tips @ drawn.goal[:3, :3].T
     slides = [curve.direction for curve in drawn.system.curves if isinstance(curve, Line)]
-    slides += [unit(v) for v in rng.normal(size=(3, 3))]
+    slides += [normalise_vector(v) for v in rng.normal(size=(3, 3))]
     b = Builder("three_lines")
     b.link("base")
     b.link("platform", at=drawn.goal[:3, 3])
     for leg, (B, d) in enumerate(zip(at, slides, strict=True), 1):
         A = B - rng.uniform(0.8, 1.6) * d
-        first = perpendicular(d)
+        first = find_perpendicular(d)
         b.link(f"lower_{leg}", at=A)
         b.link(f"upper_{leg}", at=B)
         b.joint(f"foot_{leg}", "U", "base", f"lower_{leg}", at=A, axis=first, axis2=np.cross(d, first))
@@ -73,16 +73,16 @@ def two_plates(drawn: Draw, rng: Rng) -> Mechanism:
     tips = [origin + tip for origin, tip in zip(origins, system.tips, strict=True)]
     bar = origins[1] - p - slide.centre
     hinge = origins[0] + slide.centre
-    side = 0.5 * unit(np.cross(slide.axis, bar)) + 0.2 * bar
+    side = 0.5 * normalise_vector(np.cross(slide.axis, bar)) + 0.2 * bar
     b = Builder("two_circles")
     b.link("base")
     legs: list[tuple[int, Array, Array, Array]] = [
         (k, curve.axis, B, curve.centre) for k, (curve, B) in enumerate(zip(system.curves, tips, strict=True))
     ]
     for k in (0, 1):
-        axis = unit(rng.normal(size=3))
+        axis = normalise_vector(rng.normal(size=3))
         B = origins[k] + rng.normal(scale=0.4, size=3)
-        legs.append((k, axis, B, B - rng.uniform(0.5, 1.0) * unit(np.cross(axis, rng.normal(size=3)))))
+        legs.append((k, axis, B, B - rng.uniform(0.5, 1.0) * normalise_vector(np.cross(axis, rng.normal(size=3)))))
     for leg, (k, axis, B, centre) in enumerate(legs, 1):
         _leg(b, rng, leg, f"plate_{k + 1}", axis, B, centre)
     for name, at in (("plate_1", origins[0]), ("platform", hinge), ("plate_2", origins[1]), ("side", hinge + side)):
@@ -99,7 +99,7 @@ def two_plates(drawn: Draw, rng: Rng) -> Mechanism:
 
 def _leg(b: Builder, rng: Rng, leg: int, plate: str, axis: Array, B: Array, centre: Array) -> None:
     """An arm about ``axis``, and two rods whose balls lie apart along it."""
-    rod = rng.uniform(0.8, 1.6) * unit(rng.normal(size=3))
+    rod = rng.uniform(0.8, 1.6) * normalise_vector(rng.normal(size=3))
     side = 0.1 * axis
     A, E = centre - rod, B - rod
     b.link(f"arm_{leg}", at=A)

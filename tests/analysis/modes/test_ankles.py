@@ -16,7 +16,7 @@ from hrsynth.analysis.modes.carrying_leg import carried_platform as carried_plat
 from hrsynth.analysis.modes.carrying_leg_modes import polish_zeros, proposals
 from hrsynth.analysis.modes.joint_forms import closings_bound, eigenvalues
 from hrsynth.errors import UnsupportedLocus
-from hrsynth.geometry.vectors import pose, rotation_about
+from hrsynth.geometry.vectors import build_pose, rotate_about_axis
 from hrsynth.mechanism.model import Motor
 from strategies import random_rotation, transformed
 
@@ -141,7 +141,7 @@ def test_how_a_robot_stands_does_not_change_what_its_leg_leaves(seed: int):
     assert counted.most == 6
     q = rng.normal(size=2)
     moved = system.pose(q) @ np.linalg.inv(system.pose(0 * q))
-    assert min(np.abs(moved[:3, :3] - rotation_about(R @ axis, sign * q.sum())).max() for sign in (1, -1)) < 1e-12
+    assert min(np.abs(moved[:3, :3] - rotate_about_axis(R @ axis, sign * q.sum())).max() for sign in (1, -1)) < 1e-12
 
 
 def test_motors_on_all_joints_of_a_leg_leave_it_no_way():
@@ -159,7 +159,7 @@ def test_lists_of_parallel_hinges_do_not_depend_on_how_a_robot_stands():
     R, p = random_rotation(rng), rng.normal(size=3)
     one, other = hrsynth.modes(robot, real=True), hrsynth.modes(transformed(robot, R, p), real=True)
     assert (one.found.complex, one.found.complete, one.found.bound) == (6, True, "rank")
-    same_modes(one, other, pose(p, R))
+    same_modes(one, other, build_pose(p, R))
     check_completeness(other, 20)
 
 

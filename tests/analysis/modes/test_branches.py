@@ -9,11 +9,11 @@ from analysis.modes.drives import closings, driven
 from analysis.modes.pods import displacements, pods
 from hrsynth.analysis.modes.loci import Line
 from hrsynth.analysis.modes.loci_from_joints import reaches
-from hrsynth.analysis.modes.locked_chain import Chain, ChainBody, LocusNotDerived
+from hrsynth.analysis.modes.locked_chain import Chain, ChainBody, LocusDerivationFailure
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.catalog.architecture_key import parse
-from hrsynth.catalog.geometry import mechanism
-from hrsynth.geometry.vectors import Array, cross, perpendicular, unit
+from hrsynth.catalog.geometry import build_mechanism
+from hrsynth.geometry.vectors import Array, cross, find_perpendicular, normalise_vector
 from hrsynth.mechanism.builder import Builder
 from strategies import ring
 
@@ -68,7 +68,7 @@ def test_all_branches_of_many_random_legs_are_listed(words: tuple[str, ...]):
 
 def test_a_word_of_the_catalog_has_all_its_modes():
     """3-RRPS with oblique axes: eight choices of branches, of degree 8 each."""
-    found = modes(mechanism(parse("3(Ra*-Rb-Pl*-S)")))
+    found = modes(build_mechanism(parse("3(Ra*-Rb-Pl*-S)")))
     assert (found.found.complex, len(found.modes), found.found.complete) == (64, 8, True)
     assert all(mode.reachable for mode in found.modes)
 
@@ -127,8 +127,8 @@ def test_a_list_is_not_called_all_where_a_leg_is_not_understood():
 
 def offset_u(offset: float) -> Chain:
     """Two oblique axes that miss each other by an offset, and a slide along the watched direction."""
-    a, b, d = unit([0, 0.3, 1]), unit([1, 0.2, -0.1]), unit([0.3, 0.5, 0.8])
-    off = offset * unit(np.cross(a, b))
+    a, b, d = normalise_vector([0, 0.3, 1]), normalise_vector([1, 0.2, -0.1]), normalise_vector([0.3, 0.5, 0.8])
+    off = offset * normalise_vector(np.cross(a, b))
     bodies = (
         ChainBody(None, np.zeros(3)),
         ChainBody(a, np.zeros(3), off),
@@ -146,7 +146,7 @@ def test_an_offset_parts_the_two_lines_of_a_u():
         assert isinstance(other, Line)
         assert gain == 1.0 < more
         assert 1e-3 * offset < np.linalg.norm(one.miss(other.centre)) < 3 * offset
-    with pytest.raises(LocusNotDerived, match="differ by only"):
+    with pytest.raises(LocusDerivationFailure, match="differ by only"):
         reaches(offset_u(1e-8))
 
 
@@ -155,8 +155,8 @@ def test_a_u_joint_that_carries_the_platform_holds_it_turned_by_half_a_turn_too(
     """Direction and length of a leg U-P are measured: about its direction, normal to the U's second axis, the platform
     can be turned by half a turn."""
     rng, b = np.random.default_rng(1), Builder("half_a_turn")
-    u = unit(np.array([0.1, 0.2, 1.5]))
-    first = unit(cross(u, rng.normal(size=3)))
+    u = normalise_vector(np.array([0.1, 0.2, 1.5]))
+    first = normalise_vector(cross(u, rng.normal(size=3)))
     b.link("base")
     b.link("tube")
     b.link("plate", at=u)
@@ -164,10 +164,12 @@ def test_a_u_joint_that_carries_the_platform_holds_it_turned_by_half_a_turn_too(
     b.joint("p", "P", "tube", "plate", at=u, axis=u)
     for k, A in enumerate(ring(rng, 3, 1.2)):
         B = 1.5 * u + 0.4 * A
-        along = unit(B - A)
+        along = normalise_vector(B - A)
         b.link(f"cylinder_{k}", at=A)
         b.link(f"rod_{k}", at=B)
-        b.joint(f"u_{k}", "U", "base", f"cylinder_{k}", at=A, axis=(e := perpendicular(along)), axis2=cross(along, e))
+        b.joint(
+            f"u_{k}", "U", "base", f"cylinder_{k}", at=A, axis=(e := find_perpendicular(along)), axis2=cross(along, e)
+        )
         b.joint(f"p_{k}", "P", f"cylinder_{k}", f"rod_{k}", at=(A + B) / 2, axis=along, motor=True)
         b.joint(f"s_{k}", "S", f"rod_{k}", "plate", at=B, loop=True)
     b.observe("1", "tube", u)

@@ -15,7 +15,7 @@ import pytest
 
 import hrsynth
 from analysis.modes.test_motions import flat, pod, tilted, triangle
-from hrsynth.geometry.vectors import Array, rotation_about, unit
+from hrsynth.geometry.vectors import Array, normalise_vector, rotate_about_axis
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 
@@ -34,7 +34,7 @@ def circle(axis: Array, through: Array, tip: Array) -> Path:
 
 def line(anchor: Array, tip: Array) -> Path:
     """From an anchor through a tip."""
-    return np.array([anchor, unit(tip - anchor), np.zeros(3)], dtype=complex)
+    return np.array([anchor, normalise_vector(tip - anchor), np.zeros(3)], dtype=complex)
 
 
 def squared(one: Path, other: Path, distance: float, low: int) -> Array:
@@ -124,11 +124,13 @@ def on_circles(kinds: str, motor: int, seed: int) -> tuple[Mechanism, bool, Arra
     feet = spread + rng.uniform(-0.05, 0.05, (3, 3))
     points = np.stack([feet, 0.8 * spread + rng.uniform(-0.1, 0.1, (3, 3)) + [0, 0, 0.25]], axis=1) @ tilt.T
     tips = (0.5 * spread + rng.uniform(-0.1, 0.1, (3, 3)) + [0, 0, 0.6]) @ tilt.T
-    axes = np.array([[unit(v) for v in rng.normal(size=(2, 3))] for _ in range(3)])
+    axes = np.array([[normalise_vector(v) for v in rng.normal(size=(2, 3))] for _ in range(3)])
     if kinds == "RP":
-        axes[:, 1] = [unit(tip - at) for tip, at in zip(tips, points[:, 0], strict=True)]
+        axes[:, 1] = [normalise_vector(tip - at) for tip, at in zip(tips, points[:, 0], strict=True)]
         points[:, 1] = (points[:, 0] + tips) / 2
-        axes[:, 0] = [unit(np.cross(axis, other)) for axis, other in zip(axes[:, 0], axes[:, 1], strict=True)]
+        axes[:, 0] = [
+            normalise_vector(np.cross(axis, other)) for axis, other in zip(axes[:, 0], axes[:, 1], strict=True)
+        ]
     free = kinds.index("R") if kinds != "RR" else 1
     paths = [circle(axes[k, free], points[k, free], tips[k]) for k in range(3)]
     return legs(kinds, points, axes, tips, motor), True, spatial_resultant(paths, tips, -1)
@@ -140,7 +142,7 @@ def hexa(seed: int) -> tuple[Mechanism, bool, Array]:
     spread = np.column_stack([triangle(rng), np.zeros(3)])
     A, tips = spread @ tilt.T, (0.4 * spread + rng.uniform(-0.05, 0.05, (3, 3)) + [0, 0, 0.7]) @ tilt.T
     knees = (1.3 * spread + rng.uniform(-0.1, 0.1, (3, 3)) + [0, 0, 0.2]) @ tilt.T
-    axes = [unit(np.cross(knee - at, rng.normal(size=3))) for knee, at in zip(knees, A, strict=True)]
+    axes = [normalise_vector(np.cross(knee - at, rng.normal(size=3))) for knee, at in zip(knees, A, strict=True)]
     b = Builder("hexa")
     b.link("base")
     b.link("platform", at=tips.mean(axis=0))
@@ -167,7 +169,7 @@ def one_centre(seed: int) -> tuple[Mechanism, bool, Array]:
     rng, tilt = tilted(seed)
     A, spread = rng.uniform(-0.2, 0.2, 3), np.column_stack([triangle(rng), np.zeros(3)])
     tips = (spread + rng.uniform(-0.1, 0.1, (3, 3)) + [0, 0, 0.6]) @ tilt.T
-    mechanism = pod(np.array([A] * 3), tips, "U", "S", unit(rng.normal(size=3)))
+    mechanism = pod(np.array([A] * 3), tips, "U", "S", normalise_vector(rng.normal(size=3)))
     return mechanism, False, spatial_resultant([line(A, tip) for tip in tips], tips, 0)
 
 
@@ -175,7 +177,7 @@ def planar(seed: int) -> tuple[Mechanism, bool, Array]:
     """3-RPR with the motors held."""
     rng, tilt = tilted(seed)
     A = triangle(rng)
-    B = 0.5 * A @ rotation_about((0, 0, 1), 0.4)[:2, :2].T + rng.uniform(-0.1, 0.1, (3, 2))
+    B = 0.5 * A @ rotate_about_axis((0, 0, 1), 0.4)[:2, :2].T + rng.uniform(-0.1, 0.1, (3, 2))
     return pod(flat(A, tilt), flat(B, tilt), "R", "R", tilt[:, 2]), True, planar_resultant(A, B)
 
 

@@ -13,8 +13,8 @@ from analysis.modes.digits import BITS, File, column, turned
 from hrsynth.analysis.modes.modes import AssemblyModes, drift, modes
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import list_robots, load
-from hrsynth.errors import PoseNotReached
-from hrsynth.geometry.vectors import pose
+from hrsynth.errors import PoseReachFailure
+from hrsynth.geometry.vectors import build_pose
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.mechanism.pose import Pose
@@ -90,7 +90,7 @@ def missed(name: str, setup: ObservedRobot, at: Decimals, found: AssemblyModes) 
         )
         assert left < 1e-13
         told = {link: mode.bodies[link] for link in mode.enclosed} or {
-            setup.motion.link: pose((mode.pose.x, mode.pose.y, mode.pose.z), mode.pose.rotation)
+            setup.motion.link: build_pose((mode.pose.x, mode.pose.y, mode.pose.z), mode.pose.rotation)
         }
         with ctx.workprec(BITS):
             exact = file.poses(q)
@@ -122,7 +122,7 @@ def test_the_exact_pose_is_within_the_radius_at_many_goals(name: str, observe: t
         at = goal_near_home(setup, rng)
         try:
             found = modes(setup, at=Pose.parse(at))
-        except PoseNotReached:
+        except PoseReachFailure:
             continue
         parts = missed(name, setup, decimals(at), found)
         seen += len(parts)
@@ -145,7 +145,7 @@ def goal_near_home(setup: ObservedRobot, rng: np.random.Generator) -> str:
             if motion.rotations.shape[1] == 3
             else f"phi={rng.uniform(-0.3, 0.3):.2f}"
         )
-    elif motion.planar:
+    elif motion.is_planar:
         given.append(f"phi={rng.uniform(-0.3, 0.3):.2f}")
     return ",".join(given)
 

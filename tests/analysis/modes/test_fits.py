@@ -13,10 +13,10 @@ from hrsynth.analysis.modes.loci import Circle, shift_reach
 from hrsynth.analysis.modes.modes import modes
 from hrsynth.analysis.modes.rigid import Planar, Spatial
 from hrsynth.analysis.modes.solve import SystemModes, solve
-from hrsynth.analysis.modes.translating import Translating
+from hrsynth.analysis.modes.translating import TranslatingPlatform
 from hrsynth.description import list_robots, load
-from hrsynth.geometry.vectors import Array, unit
-from hrsynth.present.text.poses import modes as text
+from hrsynth.geometry.vectors import Array, normalise_vector
+from hrsynth.present.text.poses import format_modes as text
 from strategies import random_rotation
 
 MORE: dict[str, Callable[[Rng], Draw]] = {
@@ -59,9 +59,9 @@ def test_what_may_be_the_goal_within_the_error_is_not_excluded(name: str):
     for seed in range(3):
         rng = np.random.default_rng(seed)
         system, goal = MORE[name](rng)
-        moves = [unit(rng.normal(size=3)) for _ in system.curves]
+        moves = [normalise_vector(rng.normal(size=3)) for _ in system.curves]
         if isinstance(system, Planar):
-            moves = [unit(v - system.X_plane[:3, 2] * float(system.X_plane[:3, 2] @ v)) for v in moves]
+            moves = [normalise_vector(v - system.X_plane[:3, 2] * float(system.X_plane[:3, 2] @ v)) for v in moves]
         curves = tuple(shift_reach(curve, 0.9 * error * v) for curve, v in zip(system.curves, moves, strict=True))
         near = solve(replace(system, curves=curves, error=error), near=False)
         assert not near.complete or listed(near, goal, 1e-5), near.proof
@@ -95,16 +95,16 @@ def test_a_goal_whose_solution_is_known_too_roughly_is_a_mode_all_the_same(name:
     assert solve(rough, near=False).modes == ()
 
 
-def mirrored(rng: Rng) -> tuple[Translating, Array]:
+def mirrored(rng: Rng) -> tuple[TranslatingPlatform, Array]:
     """Four circles through two points that mirror each other at a plane in which all centres and axes lie."""
     R, o = random_rotation(rng), rng.normal(size=3)
     n, height = R[:, 2], 0.7
     curves = []
     for _ in range(4):
         x, y = rng.normal(size=2)
-        centre, axis = o + R @ (x, y, 0), R @ unit(np.array([-y, x, 0]))
+        centre, axis = o + R @ (x, y, 0), R @ normalise_vector(np.array([-y, x, 0]))
         curves.append(Circle(centre, axis, float(np.hypot(np.hypot(x, y), height))))
-    return Translating(tuple(curves), np.zeros((4, 3))), o + height * n
+    return TranslatingPlatform(tuple(curves), np.zeros((4, 3))), o + height * n
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -13,8 +13,8 @@ from hrsynth.analysis.modes.assembly_mode import AssemblyMode
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.certificates import certificate
 from hrsynth.errors import BadRequest, NoCertificate
-from hrsynth.families.formations import formation
-from hrsynth.geometry.vectors import Array, frozen
+from hrsynth.families.formations import build_formation
+from hrsynth.geometry.vectors import Array, freeze_array
 from hrsynth.mechanism.observations.distance import PointDistance
 from hrsynth.present.show import text
 from strategies import random_rotation
@@ -76,7 +76,7 @@ def test_rigid_bearings_in_a_common_frame_have_one_mode_by_rank(bodies: str, n: 
             row[j - 1, [a, b]] = row[i - 1, [a, b]] = -arm[b], arm[a]
             row[i - 1] *= -1
             rows.append(row.ravel().tolist())
-    found = modes(formation(places.astype(float), bearings, bodies=bodies))
+    found = modes(build_formation(places.astype(float), bearings, bodies=bodies))
     assert fmpz_mat(rows).rank() == d * n - d - 1
     assert (found.found.complete, found.found.complex, len(found.modes), len(found.antipodal)) == (True, 1, 1, 0)
     assert found.modes[0].goal
@@ -87,7 +87,7 @@ def test_rigid_bearings_in_a_common_frame_have_one_mode_by_rank(bodies: str, n: 
 
 def test_a_distance_leaves_the_opposite_of_all_bearings():
     places = np.random.default_rng(1).normal(size=(5, 3))
-    found = modes(formation(places, LAMAN, [(1, 2)], bodies="position"))
+    found = modes(build_formation(places, LAMAN, [(1, 2)], bodies="position"))
     assert (found.found.complete, found.found.complex, len(found.modes)) == (True, 2, 1)
     (other,) = found.antipodal
     assert set(other.opposite) == {f"{i}-{j}" for i, j in LAMAN}
@@ -106,7 +106,7 @@ def test_a_distance_leaves_the_opposite_of_all_bearings():
 )
 def test_a_flexible_formation_has_a_continuum_with_its_flexes(places: Array, bearings: Pairs, flexes: int):
     """A ring; and three on one line, whose decimals are not on one line as binary numbers."""
-    found = modes(formation(places, bearings, bodies="position"))
+    found = modes(build_formation(places, bearings, bodies="position"))
     assert (found.found.continuous_family, found.found.complete, found.modes) == (flexes, False, ())
     assert found.formation is not None
     assert sum(each.count for each in found.formation.flexes) == flexes
@@ -143,7 +143,7 @@ def test_as_many_are_found_as_are_known(bodies: str, n: int, bearings: Pairs, di
     if "plane" in bodies:
         places[:, 2] = 0.25
     turns = None if "plane" in bodies else [random_rotation(rng) for _ in range(n)]
-    found = modes(formation(places, bearings, distances, bodies=bodies, turns=turns))
+    found = modes(build_formation(places, bearings, distances, bodies=bodies, turns=turns))
     assert len(found.modes) == count
     assert (found.found.complete, found.found.complex) == (False, None)
     assert found.modes[0].goal
@@ -190,7 +190,7 @@ def test_the_modes_of_a_prism_are_those_of_two_triangles_on_three_rods(seed: int
     flat = places[:, :2]
     rods = np.linalg.norm(flat[:3] - flat[3:], axis=1)
     expected = 2 * sum(placings(flat[:3], (flat[3:] - flat[3]) * np.array([1, side]), rods) for side in (1, -1))
-    found = modes(formation(places, [], PRISM, bodies="plane position"))
+    found = modes(build_formation(places, [], PRISM, bodies="plane position"))
     assert len(found.modes) == expected <= 24
     require_modes(found, [], PRISM)
 
@@ -200,9 +200,11 @@ def test_what_is_moved_along_is_no_other_mode(seed: int):
     """Distances between points aside of two origins, in a tilted common frame: translations alone are trivial, and no
     two modes are alike but for one."""
     rng = np.random.default_rng(seed)
-    made = formation(rng.normal(size=(2, 3)), distances=[(1, 2)] * 6, bodies="position", frame=random_rotation(rng))
+    made = build_formation(
+        rng.normal(size=(2, 3)), distances=[(1, 2)] * 6, bodies="position", frame=random_rotation(rng)
+    )
     seen = tuple(
-        replace(each, leg=f"d{k}", at=frozen(rng.normal(size=3)))
+        replace(each, leg=f"d{k}", at=freeze_array(rng.normal(size=3)))
         for k, each in enumerate(made.observations)
         if isinstance(each, PointDistance)
     )
@@ -214,7 +216,7 @@ def test_what_is_moved_along_is_no_other_mode(seed: int):
 
 
 def test_poses_and_motors_of_formations_are_refused():
-    made = formation(np.eye(3), [(1, 2), (2, 3), (1, 3)], bodies="position")
+    made = build_formation(np.eye(3), [(1, 2), (2, 3), (1, 3)], bodies="position")
     for asked in ({"at": "x=1"}, {"at": "mode:1"}, {"real": True}):
         with pytest.raises(BadRequest, match="a formation has no"):
             modes(made, **asked)

@@ -13,8 +13,8 @@ from hrsynth.analysis.modes.constrained_platform import System
 from hrsynth.analysis.modes.loci import Circle, Curve, Line, shift_reach
 from hrsynth.analysis.modes.rigid import Planar, Spatial
 from hrsynth.analysis.modes.solve import SystemModes, solve
-from hrsynth.analysis.modes.translating import Articulated, Translating
-from hrsynth.geometry.vectors import Array, pose, rotation_about, unit
+from hrsynth.analysis.modes.translating import ArticulatedPlatform, TranslatingPlatform
+from hrsynth.geometry.vectors import Array, build_pose, normalise_vector, rotate_about_axis
 from strategies import random_rotation
 
 ALL = sorted(FAMILIES)
@@ -132,13 +132,13 @@ def test_modes_move_with_the_base(name: str):
     for seed in range(5):
         rng = np.random.default_rng(1000 + seed)
         system, _ = draw(name, seed)
-        X = pose(rng.normal(size=3), random_rotation(rng))
+        X = build_pose(rng.normal(size=3), random_rotation(rng))
         curves = tuple(carried(curve, X) for curve in system.curves)
-        if isinstance(system, Articulated):
+        if isinstance(system, ArticulatedPlatform):
             R = X[:3, :3]
-            slide = carried(system.slide, pose((0, 0, 0), R))
-            moved: System = Articulated(curves, system.tips @ R.T, system.bodies, slide)
-            places = [pose(X[:3, :3] @ mode.pose[:3, 3] + X[:3, 3]) for mode in solve(system).modes]
+            slide = carried(system.slide, build_pose((0, 0, 0), R))
+            moved: System = ArticulatedPlatform(curves, system.tips @ R.T, system.bodies, slide)
+            places = [build_pose(X[:3, :3] @ mode.pose[:3, 3] + X[:3, 3]) for mode in solve(system).modes]
         else:
             moved = Spatial(curves, system.tips)
             places = [X @ mode.pose for mode in solve(system).modes]
@@ -198,7 +198,7 @@ def test_circles_with_centres_at_equal_height_meet_twice():
     each other of a translating platform."""
     tips = np.zeros((2, 3))
     curves = (Circle((1, 0, 0), (0, 1, 0), np.sqrt(2)), Circle((0, 1, 0), (1, 0, 0), np.sqrt(2)))
-    modes = solve(Translating(curves, tips))
+    modes = solve(TranslatingPlatform(curves, tips))
     assert modes.complex == 2
     assert sorted(round(mode.pose[2, 3], 12) for mode in modes.modes) == [-1.0, 1.0]
 
@@ -228,9 +228,9 @@ def test_directions_that_no_pose_matches_leave_no_mode():
 
 def in_tilted_plane(rng: np.random.Generator) -> tuple[Array, Array, Array]:
     """A plane's frame, three tips, and where the tips are at some pose."""
-    X = pose(rng.normal(size=3), random_rotation(rng))
+    X = build_pose(rng.normal(size=3), random_rotation(rng))
     tips = rng.normal(size=(3, 2))
-    goal = X @ pose((0.3, 0.2, 0), rotation_about((0, 0, 1), 0.5))
+    goal = X @ build_pose((0.3, 0.2, 0), rotate_about_axis((0, 0, 1), 0.5))
     return X, tips, goal[:3, 3] + tips @ goal[:3, :2].T
 
 
@@ -239,7 +239,7 @@ def in_tilted_plane(rng: np.random.Generator) -> tuple[Array, Array, Array]:
 def test_a_continuum_is_said_and_not_listed(kind: str):
     for seed in range(4):
         X, tips, at = in_tilted_plane(np.random.default_rng(seed))
-        n, e = X[:3, 2], unit(X[:3, 0] + 0.3 * X[:3, 1])
+        n, e = X[:3, 2], normalise_vector(X[:3, 0] + 0.3 * X[:3, 1])
         centre = at.mean(axis=0)
         curves: dict[str, list[Curve]] = {
             "equal arms": [Circle(point + 0.7 * e, n, 0.7) for point in at],
@@ -253,7 +253,11 @@ def test_a_continuum_is_said_and_not_listed(kind: str):
 
 def test_other_continua():
     rng = np.random.default_rng(0)
-    d, tips, X = unit(rng.normal(size=3)), rng.normal(size=(3, 3)), pose(rng.normal(size=3), random_rotation(rng))
+    d, tips, X = (
+        normalise_vector(rng.normal(size=3)),
+        rng.normal(size=(3, 3)),
+        build_pose(rng.normal(size=3), random_rotation(rng)),
+    )
     lines = tuple(Line(X[:3, 3] + X[:3, :3] @ tip, d) for tip in tips)
     assert solve(Spatial(lines, tips)).continuous_family == 1
     for seed in range(3):
@@ -297,7 +301,7 @@ def singular(kind: str, rng: np.random.Generator) -> SystemModes:
     tips, centre = rng.normal(size=(3, 2)), np.array([0.3, -0.4])
     curves: list[Curve] = []
     for tip in tips:
-        n = np.array([*unit(centre - tip), 0.0])
+        n = np.array([*normalise_vector(centre - tip), 0.0])
         at = np.array([*tip, 0.0])
         curves.append(
             Line(at, np.cross(n, (0, 0, 1)))
@@ -313,7 +317,7 @@ def test_centres_that_are_one_but_for_rounding_give_no_size(seed: int, apart: fl
     """Two lines that are given by the very point in which they meet."""
     rng = np.random.default_rng(seed)
     p = rng.normal(scale=0.2, size=3)
-    curves = (Line(p, rng.normal(size=3)), Line(p + apart * unit(rng.normal(size=3)), rng.normal(size=3)))
-    modes = solve(Translating(curves, np.zeros((2, 3))))
+    curves = (Line(p, rng.normal(size=3)), Line(p + apart * normalise_vector(rng.normal(size=3)), rng.normal(size=3)))
+    modes = solve(TranslatingPlatform(curves, np.zeros((2, 3))))
     assert (modes.complex, len(modes.modes), modes.complete) == (1, 1, True)
     assert modes.modes[0].pose[:3, 3] == pytest.approx(p, abs=1e-14)

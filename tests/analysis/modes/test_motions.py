@@ -12,7 +12,7 @@ import hrsynth
 from hrsynth.analysis.modes.modes import AssemblyModes
 from hrsynth.analysis.modes.self_motions import SelfMotion
 from hrsynth.description import list_robots, load
-from hrsynth.geometry.vectors import Array, rotation_about, unit
+from hrsynth.geometry.vectors import Array, normalise_vector, rotate_about_axis
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Limits
@@ -21,7 +21,7 @@ from hrsynth.mechanism.model import Limits
 def tilted(seed: int) -> tuple[np.random.Generator, Array]:
     """Random numbers, and a random rotation (3, 3) of the base."""
     rng = np.random.default_rng(seed)
-    return rng, rotation_about(rng.normal(size=3), rng.uniform(0, 3))
+    return rng, rotate_about_axis(rng.normal(size=3), rng.uniform(0, 3))
 
 
 def pod(anchors: Array, tips: Array, base: str, end: str, axis: Array) -> Mechanism:
@@ -35,7 +35,7 @@ def pod(anchors: Array, tips: Array, base: str, end: str, axis: Array) -> Mechan
         b.link(f"rod_{k}", at=B)
         second = np.cross(axis, B - A) if base == "U" else None
         b.joint(f"foot_{k}", base, "base", f"tube_{k}", at=A, axis=axis, axis2=second)
-        b.joint(f"slide_{k}", "P", f"tube_{k}", f"rod_{k}", at=(A + B) / 2, axis=unit(B - A), motor=True)
+        b.joint(f"slide_{k}", "P", f"tube_{k}", f"rod_{k}", at=(A + B) / 2, axis=normalise_vector(B - A), motor=True)
         b.joint(f"ball_{k}", end, f"rod_{k}", "platform", at=B, axis=axis if end == "R" else None, loop=k > 1)
     return b.build(platform="platform")
 
@@ -125,7 +125,7 @@ def test_an_octahedron_of_bricard_moves():
     pairs = [(i, j) for i in range(3) for j in range(3) if i != j]
     anchors = np.array([corners[i] for i, _ in pairs]) @ tilt.T
     tips = np.array([opposite[j] for _, j in pairs]) @ tilt.T
-    found = hrsynth.modes(pod(anchors, tips, "U", "S", unit(rng.normal(size=3))), real=True)
+    found = hrsynth.modes(pod(anchors, tips, "U", "S", normalise_vector(rng.normal(size=3))), real=True)
     motion = next(each for each in found.self_motions if each.goal)
     check_found(found, motion, anchors, tips)
     assert motion.dimension == 1
@@ -137,7 +137,7 @@ def test_equal_parallel_legs_in_space_carry_a_congruent_platform_on_a_sphere():
     """Two ways to move, though to first order it could turn about the legs' direction as well."""
     rng, tilt = tilted(5)
     anchors, way = rng.uniform(-0.4, 0.4, (6, 3)) @ tilt.T, rng.uniform(0.2, 0.5, 3)
-    found = hrsynth.modes(pod(anchors, anchors + way, "U", "S", unit(rng.normal(size=3))), real=True)
+    found = hrsynth.modes(pod(anchors, anchors + way, "U", "S", normalise_vector(rng.normal(size=3))), real=True)
     motion = next(each for each in found.self_motions if each.goal)
     check_found(found, motion, anchors, anchors + way)
     assert motion.dimension == 2
@@ -150,9 +150,9 @@ def test_a_platform_on_points_of_similar_conics_moves_generically():
     rng, tilt = tilted(6)
     angles = np.arange(6) * math.pi / 3 + rng.uniform(-0.3, 0.3, 6)
     A = np.column_stack([0.4 * np.cos(angles), 0.3 * np.sin(angles), np.zeros(6)])
-    D = rotation_about(rng.normal(size=3), 0.4)
+    D = rotate_about_axis(rng.normal(size=3), 0.4)
     anchors, tips = A @ tilt.T, (0.6 * A @ D.T + [0.05, 0.02, 0.4]) @ tilt.T
-    found = hrsynth.modes(pod(anchors, tips, "U", "S", unit(rng.normal(size=3))), real=True)
+    found = hrsynth.modes(pod(anchors, tips, "U", "S", normalise_vector(rng.normal(size=3))), real=True)
     (motion,) = found.self_motions
     assert found.found.continuous_family == motion.dimension == 1
     assert np.abs(lengths(motion, anchors, tips) - np.linalg.norm(tips - anchors, axis=1)).max() < 1e-9

@@ -15,19 +15,19 @@ from description.foreign.rounded import exported, of_hinges
 from hrsynth.analysis.modes.modes import AssemblyModes
 from hrsynth.analysis.modes.near import descend, measurement_bound
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.analysis.pose_requests import configurations_at
+from hrsynth.analysis.pose_requests import solve_configurations
 from hrsynth.description import list_robots, load
 from hrsynth.errors import BadRequest, UnsupportedLocus
-from hrsynth.geometry.vectors import angle_between, pose, rotation_about, unit
+from hrsynth.geometry.vectors import build_pose, measure_angle, normalise_vector, rotate_about_axis
 from hrsynth.kinematics.configuration import ClosedConfiguration, measure
 from hrsynth.kinematics.tasks import FixedValuesTask
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.pose import Pose
 from hrsynth.present.report.answer import answer
-from hrsynth.present.report.parts import Parts, Refused
-from hrsynth.present.studio.asks.answer import rest
+from hrsynth.present.report.parts import Parts, RefusedPart
+from hrsynth.present.studio.asks.answer import describe_remaining_error
 
-TILT = pose((0.123, -0.377, 0.219), rotation_about(unit([1.0, 2.0, 0.5]), 0.7))
+TILT = build_pose((0.123, -0.377, 0.219), rotate_about_axis(normalise_vector([1.0, 2.0, 0.5]), 0.7))
 
 
 def tilted(robot: Mechanism) -> Mechanism:
@@ -85,7 +85,7 @@ def test_what_is_told_of_a_near_mode_is_so(cad: Mechanism):
     seen = [
         measure(each.model, each.q, found.setup.mechanism.base, found.setup.observed)[2] for each in (found.goal, at)
     ]
-    angles = [angle_between(one, other) for one, other in zip(*seen, strict=True)]
+    angles = [measure_angle(one, other) for one, other in zip(*seen, strict=True)]
     assert 0 < near.angle < np.radians(1e-3)
     assert max(angles) == pytest.approx(near.angle, rel=1e-3, abs=1e-8)
     apart = at.pose("platform")[:3, 3] - found.goal.pose("platform")[:3, 3]
@@ -106,12 +106,12 @@ def test_the_bound_is_that_of_the_measurement(cad: Mechanism):
 
 def test_every_answer_counts_it(cad: Mechanism):
     derived = hrsynth.derive(cad)
-    found, left = derived.modes(), Refused("not asked")
+    found, left = derived.modes(), RefusedPart("not asked")
     words = "2 poses look the same: the goal and one that differs by "
     assert words in found.headline()
     assert words in str(found)
     assert found.to_dict()["near_modes"][0]["stable"] is True
-    assert "one other pose, 24 cm away" in rest(found.setup)[1]
+    assert "one other pose, 24 cm away" in describe_remaining_error(found.setup)[1]
     assert any(words in each for each in answer(derived, Parts(left, left, found, left)))
 
 
@@ -151,7 +151,7 @@ def test_a_stationary_difference_is_a_near_mode_only_where_it_is_least():
     low, high = (mode.pose.z for mode in hrsynth.modes(setup).modes)
 
     def at(z: float) -> ClosedConfiguration:
-        return configurations_at(setup, [Pose(x=0.0, y=0.0, z=z)])[0]
+        return solve_configurations(setup, [Pose(x=0.0, y=0.0, z=z)])[0]
 
     top = minimize_scalar(
         lambda z: -np.linalg.norm(held.error_and_jacobian(goal.model, at(z).q)[0]),
@@ -173,7 +173,7 @@ def test_poses_that_fill_a_curve_are_a_family_and_attract_to_no_pose(name: str):
     held = FixedValuesTask.at(goal.model, goal.q, observation_model.reference, observation_model.observations)
     home = setup.motion.position(goal.pose(setup.motion.link))
     for x, y in ((0.0, 0.0), (0.0, 0.05), (0.02, 0.05)):
-        beside = configurations_at(setup, [Pose(x=home[0] + x, y=home[1] + y)])[0]
+        beside = solve_configurations(setup, [Pose(x=home[0] + x, y=home[1] + y)])[0]
         found = descend(beside, observation_model, held, 1e-6)
         assert found is not None
         assert (found.isolated, found.family) == (False, True)

@@ -18,15 +18,15 @@ from PIL import Image
 from hrsynth.analysis.modes.loci import Circle, Line, Point
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.cli import execute
+from hrsynth.cli import run_command
 from hrsynth.description import list_robots, load
 from hrsynth.errors import BadRequest
-from hrsynth.geometry.vectors import rotation_about
-from hrsynth.present.coupler import chains, points, swept, trace_coupler
-from hrsynth.present.modes import MARKS, description, drawable, figure, picture
-from hrsynth.present.scenes import CLOSES, GOAL, NEAR, OPEN, ModesScene, scene
+from hrsynth.geometry.vectors import rotate_about_axis
+from hrsynth.present.coupler import evaluate_curve, sweep_third_point, trace_coupler, trace_coupler_chains
+from hrsynth.present.modes import MARKS, describe_scene, draw_modes, draw_modes_figure, require_scene
+from hrsynth.present.scenes import CLOSES, GOAL, NEAR, OPEN, ModesScene, build_modes_scene
 from hrsynth.present.sketch import Sketch
-from hrsynth.present.text.poses import modes as text
+from hrsynth.present.text.poses import format_modes as text
 from strategies import random_rotation, transformed
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -55,7 +55,7 @@ def found(name: str, observe: str | None = None, real: bool = False) -> Assembly
 
 @cache
 def drawn(name: str, observe: str | None = None, real: bool = False) -> ModesScene:
-    return scene(found(name, observe, real))
+    return build_modes_scene(found(name, observe, real))
 
 
 def apart(point: np.ndarray, curve: np.ndarray, normal: np.ndarray | None) -> float:
@@ -104,7 +104,7 @@ def test_numbers_states_and_words_are_the_texts(name: str, observe: str | None, 
 def test_strokes_keep_their_lengths_and_the_base_its_place(name: str, observe: str | None, real: bool):
     """Links are rigid: each polygon is congruent at all modes; each leg begins at the base."""
     result, view = found(name, observe, real), drawn(name, observe, real)
-    slides = sum(joint.type.slides for joint in result.goal.model.mechanism.joints.values())
+    slides = sum(joint.type.has_translation for joint in result.goal.model.mechanism.joints.values())
     shapes = [
         sorted(
             round(float(np.linalg.norm(np.diff(ring, axis=0), axis=1).sum()), 6)
@@ -134,7 +134,7 @@ def test_a_robot_that_does_not_close_is_drawn_as_its_platform_alone():
 def test_a_tilted_robot_is_drawn_tilted(name: str, observe: str | None):
     rng = rng_of(5)
     R, p = random_rotation(rng), rng.normal(size=3)
-    moved = scene(modes(transformed(load(list_robots()[name]), R, p), observe))
+    moved = build_modes_scene(modes(transformed(load(list_robots()[name]), R, p), observe))
     view = drawn(name, observe)
     spots = sorted(np.round(R @ each.at + p, 6).tolist() for each in view.placed)
     assert sorted(np.round(each.at, 6).tolist() for each in moved.placed) == pytest.approx(np.array(spots), abs=2e-6)
@@ -146,7 +146,7 @@ def test_a_tilted_robot_is_drawn_tilted(name: str, observe: str | None):
 def test_where_tips_are_on_surfaces_or_unknown_the_platforms_are_drawn():
     result = found("gough_stewart", "1,3,5")
     other = replace(result.found, modes=tuple(replace(mode, legs=()) for mode in result.found.modes))
-    view = scene(replace(result, found=other))
+    view = build_modes_scene(replace(result, found=other))
     assert view.traces == ()
     assert np.allclose(view.placed[0].at, [result.pose.x, result.pose.y, result.pose.z], atol=1e-9)
 
@@ -154,7 +154,7 @@ def test_where_tips_are_on_surfaces_or_unknown_the_platforms_are_drawn():
 def test_near_modes_have_their_own_mark():
     result = found("gough_stewart", "1,3,5")
     near = replace(result, modes=result.modes[:1], near_modes=result.modes[1:])
-    assert [(each.label, each.state) for each in scene(near).placed] == [("1", GOAL), ("near 1", NEAR)]
+    assert [(each.label, each.state) for each in build_modes_scene(near).placed] == [("1", GOAL), ("near 1", NEAR)]
     assert len({mark for mark, _, _ in MARKS.values()}) == len(MARKS)
 
 
@@ -174,7 +174,7 @@ def test_a_bar_keeps_its_length_and_its_ends_their_curves(kinds: str, seed: int)
     curves = [made[kind]() for kind in kinds]
     ends = [curve.at(rng.uniform(-2, 2)) for curve in curves]
     length = float(np.linalg.norm(ends[1] - ends[0]))
-    found = chains(curves[0], curves[1], length, 181)
+    found = trace_coupler_chains(curves[0], curves[1], length, 181)
     for one, other in found:
         assert np.allclose(np.linalg.norm(other - one, axis=1), length, atol=1e-6)
         assert max(np.linalg.norm(curves[0].miss(tip)) for tip in one) < 1e-9
@@ -188,14 +188,14 @@ def test_a_traced_point_keeps_its_triangle():
     triangle = rng.normal(size=(3, 3))
     triangle[:, 2] = 0.0
     n = np.array([0.0, 0.0, 1.0])
-    turn = rotation_about(n, 0.7)
+    turn = rotate_about_axis(n, 0.7)
     pair = tuple((turn @ triangle[k] + [0.2, 0.1, 0.0])[None] for k in (0, 1))
     assert np.allclose(trace_coupler(pair, triangle, n), turn @ triangle[2] + [0.2, 0.1, 0.0])
-    surface = swept(pair, triangle, 40)
+    surface = sweep_third_point(pair, triangle, 40)
     for k in (0, 1):
         sides = np.linalg.norm(surface - pair[k], axis=2)
         assert np.allclose(sides, np.linalg.norm(triangle[2] - triangle[k]))
-    assert np.allclose(points(Line(np.zeros(3), n), np.array([2.0])), [[0, 0, 2.0]])
+    assert np.allclose(evaluate_curve(Line(np.zeros(3), n), np.array([2.0])), [[0, 0, 2.0]])
 
 
 # ---- the page
@@ -213,7 +213,7 @@ def test_a_traced_point_keeps_its_triangle():
 )
 def test_numbers_do_not_cover_each_other_and_nothing_leaves_the_page(name: str, observe: str | None):
     result = found(name, observe)
-    page = figure(result, drawn(name, observe))
+    page = draw_modes_figure(result, drawn(name, observe))
     page.canvas.draw()
     main = page.axes[0]
     boxes = [label.get_window_extent() for label in main.texts]
@@ -254,7 +254,7 @@ def test_numbers_of_a_crowd_keep_out_of_each_other():
 @pytest.mark.some(1)
 @pytest.mark.parametrize(("name", "observe"), [("3rrr_m1", None), ("quattro", "1,4")])
 def test_scales_are_equal(name: str, observe: str | None):
-    page = figure(found(name, observe), drawn(name, observe))
+    page = draw_modes_figure(found(name, observe), drawn(name, observe))
     page.canvas.draw()
     for place in page.axes:
         if drawn(name, observe).normal is not None:
@@ -274,7 +274,7 @@ def test_bad_files_are_refused_before_any_work(
 ):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(ObservedRobot, "of", lambda *a, **k: pytest.fail("work was begun"))
-    assert execute(["modes", "rrrrr_m1", "-o", path]) == 2
+    assert run_command(["modes", "rrrrr_m1", "-o", path]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
 
@@ -283,9 +283,9 @@ def test_bad_files_are_refused_before_any_work(
 @pytest.mark.parametrize(("name", "observe"), [("quattro", "1,2"), ("i4l", None)])
 def test_a_continuum_is_not_drawn(name: str, observe: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     with pytest.raises(BadRequest, match=r"nothing to draw: .*continuous family"):
-        drawable(found(name, observe))
+        require_scene(found(name, observe))
     arguments = [] if observe is None else ["--observe", observe]
-    assert execute(["modes", name, *arguments, "-o", str(tmp_path / "x.png")]) == 0
+    assert run_command(["modes", name, *arguments, "-o", str(tmp_path / "x.png")]) == 0
     out, err = capsys.readouterr()
     assert "a continuous family of dimension" in out
     assert "is not drawn" in err
@@ -294,9 +294,9 @@ def test_a_continuum_is_not_drawn(name: str, observe: str | None, tmp_path: Path
 
 def test_the_command_draws_and_the_file_says_what_it_holds(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     file = tmp_path / "x.png"
-    assert execute(["modes", "3rrr_m1", "-o", str(file), "--json"]) == 0
+    assert run_command(["modes", "3rrr_m1", "-o", str(file), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["file"] == str(file)
-    assert held(file) == json.loads(json.dumps(description(found("3rrr_m1"), drawn("3rrr_m1"))))
+    assert held(file) == json.loads(json.dumps(describe_scene(found("3rrr_m1"), drawn("3rrr_m1"))))
 
 
 def held(file: Path) -> dict:
@@ -305,7 +305,7 @@ def held(file: Path) -> dict:
 
 
 def test_two_pictures_of_the_same_are_the_same():
-    assert picture(found("rrrrr_m1")) == picture(found("rrrrr_m1"))
+    assert draw_modes(found("rrrrr_m1")) == draw_modes(found("rrrrr_m1"))
 
 
 # ---- figures of the pages
@@ -353,7 +353,7 @@ def test_figures_of_pages_are_fresh_and_small(file: Path):
     valued = [option for option in options if option != "--real"]
     given = dict(zip(valued[::2], valued[1::2], strict=True))
     result = modes(load(list_robots()[robot]), given.get("--observe"), at=given.get("--at"), real="--real" in options)
-    fresh, kept = json.loads(json.dumps(description(result, drawable(result)))), held(file)
+    fresh, kept = json.loads(json.dumps(describe_scene(result, require_scene(result)))), held(file)
     assert words(fresh) == words(kept), "stale: make pictures"
     assert numbers(fresh) == pytest.approx(numbers(kept), abs=1e-6 * result.goal.model.length), "stale: make pictures"
     assert file.stat().st_size < 150_000

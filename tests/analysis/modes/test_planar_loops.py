@@ -20,11 +20,11 @@ from hrsynth.analysis.modes.planar_modes import solve_loops
 from hrsynth.analysis.modes.planar_reading import planar_loops, whole_kernel
 from hrsynth.analysis.modes.search import search
 from hrsynth.catalog.architecture_key import parse
-from hrsynth.catalog.geometry import mechanism
-from hrsynth.constraints.pattern import leg_ends, placing_links
+from hrsynth.catalog.geometry import build_mechanism
+from hrsynth.constraints.pattern import list_leg_ends, list_placing_links
 from hrsynth.description import list_robots, load
-from hrsynth.errors import SystemNotSolved, UnsupportedLocus
-from hrsynth.geometry.vectors import pose_difference
+from hrsynth.errors import ExternalSolverFailure, UnsupportedLocus
+from hrsynth.geometry.vectors import compare_poses
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 
@@ -59,7 +59,7 @@ def test_loops_and_tips_agree(name: str, real: bool):
     """The general way shares neither unknowns nor solver with the others."""
     listed = hrsynth.modes(name, real=real)
     if listed.found.continuous_family is not None:
-        with pytest.raises((UnsupportedLocus, SystemNotSolved)):
+        with pytest.raises((UnsupportedLocus, ExternalSolverFailure)):
             solve_loops(measured(listed), listed.goal)
         return
     made, found = solve_loops(measured(listed), listed.goal)
@@ -73,7 +73,7 @@ def test_loops_and_tips_agree(name: str, real: bool):
         assert (
             min(
                 max(
-                    pose_difference(X, made.bodies(each.q)[body], length, listed.setup.decomposition.point)
+                    compare_poses(X, made.bodies(each.q)[body], length, listed.setup.decomposition.point)
                     for body, X in mode.bodies.items()
                 )
                 for each in found.modes
@@ -115,7 +115,7 @@ def test_geared_five_bars(ratio: str, seed: int):
 @pytest.mark.parametrize("ratio", [2.0, -1.0])
 def test_a_search_finds_only_closings_that_are_listed(ratio: float):
     listed = hrsynth.modes(five_bar(ratio, 3)[0], "1")
-    found = search(listed.goal, measured(listed).observation_model, leg_ends(listed.setup.decomposition))
+    found = search(listed.goal, measured(listed).observation_model, list_leg_ends(listed.setup.decomposition))
     assert len(found.modes) > 1
     for mode in found.modes:
         assert (
@@ -163,9 +163,9 @@ def test_a_six_bar_of_two_loops(motor: str, platform: str, count: int, loops: in
 )
 def test_loops_are_told_so_that_their_degrees_are_low(word: str, count: int):
     """A tip on a line of the platform, two on circles: 6, as a coupler curve meets a circle; lines alone leave 4."""
-    found = hrsynth.modes(mechanism(parse(word)), real=True)
+    found = hrsynth.modes(build_mechanism(parse(word)), real=True)
     assert (found.found.complete, found.found.complex) == (True, count)
-    others = search(found.goal, measured(found).observation_model, leg_ends(found.setup.decomposition))
+    others = search(found.goal, measured(found).observation_model, list_leg_ends(found.setup.decomposition))
     for mode in others.modes:
         assert (
             min(
@@ -207,7 +207,7 @@ def test_what_is_too_large_says_its_size():
     found = hrsynth.modes("3rrr_m1")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "LARGEST_LOOPS", 5)
-        with pytest.raises(SystemNotSolved, match="2 loops, 4 angles and 0 slides: up to 6 solutions, too many"):
+        with pytest.raises(ExternalSolverFailure, match="2 loops, 4 angles and 0 slides: up to 6 solutions, too many"):
             solve_loops(measured(found), found.goal)
 
 
@@ -282,7 +282,7 @@ def test_a_tool_that_cranks_on_the_platform_carry_has_both_its_places():
             [
                 [*(there.pose("tool") @ [0.23, -0.07, 0, 1])]
                 for there in at
-                if there is not None and pose_difference(there.pose("bar"), bar, 1.0) < 1e-9
+                if there is not None and compare_poses(there.pose("bar"), bar, 1.0) < 1e-9
             ]
         )
         assert len(H) == 2
@@ -344,12 +344,12 @@ def test_measurements_of_one_freedom_hold_it_once():
     listed = hrsynth.modes(carried("tool"), sensor=[f"encoder:{joint}" for joint in "ace"])
     assert listed.found.complete
     assert len(listed.modes) == 2
-    found = search(listed.goal, measured(listed).observation_model, placing_links(listed.setup.decomposition))
+    found = search(listed.goal, measured(listed).observation_model, list_placing_links(listed.setup.decomposition))
     assert len(found.modes) == 2
     for one in found.modes:
         assert (
             min(
-                pose_difference(one.bodies["tool"], each.configuration.pose("tool"), 1.0)
+                compare_poses(one.bodies["tool"], each.configuration.pose("tool"), 1.0)
                 for each in listed.modes
                 if each.configuration
             )
@@ -403,7 +403,8 @@ def test_two_segments_of_a_leg_are_both_watched(observe: str | None):
     assert [each.link for each in found.setup.observed] == ["one", "two", "rod"]
     assert (found.found.complete, len(found.modes)) == (True, 1)
     assert (
-        len(search(found.goal, measured(found).observation_model, placing_links(found.setup.decomposition)).modes) == 1
+        len(search(found.goal, measured(found).observation_model, list_placing_links(found.setup.decomposition)).modes)
+        == 1
     )
 
 

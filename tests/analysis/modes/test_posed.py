@@ -27,9 +27,9 @@ from hrsynth.analysis.modes.search import search
 from hrsynth.analysis.modes.tips import tip_loci
 from hrsynth.analysis.pose_requests import observe
 from hrsynth.catalog.architecture_key import parse
-from hrsynth.catalog.geometry import mechanism
-from hrsynth.constraints.pattern import leg_ends
-from hrsynth.geometry.vectors import pose_difference
+from hrsynth.catalog.geometry import build_mechanism
+from hrsynth.constraints.pattern import list_leg_ends
+from hrsynth.geometry.vectors import compare_poses
 from strategies import spherical
 
 SAME = 1e-6
@@ -38,7 +38,7 @@ SAME = 1e-6
 
 def measured(word, legs, seed=0):
     """Some legs of a word watched, or its motors (no legs)."""
-    setup = observe(mechanism(parse(word), seed), samples=4)
+    setup = observe(build_mechanism(parse(word), seed), samples=4)
     if not legs:
         return MeasuredRobot.of_motors(setup)
     seen = tuple(o for o in setup.segments if o.leg in legs)
@@ -47,7 +47,7 @@ def measured(word, legs, seed=0):
 
 def distance(one, other, length):
     """Between two lists of poses: the farthest of the first from the second."""
-    return max((min((pose_difference(X, Y, length) for Y in other), default=np.inf) for X in one), default=0.0)
+    return max((min((compare_poses(X, Y, length) for Y in other), default=np.inf) for X in one), default=0.0)
 
 
 KINDS = [
@@ -80,7 +80,7 @@ def test_what_random_starts_find_is_listed(word, legs, count):
     at = robot.setup.configurations[1]
     made, found = solve_posed(robot, at)
     assert (found.complex, found.complete) == (count, True)
-    (body,) = leg_ends(robot.setup.decomposition)
+    (body,) = list_leg_ends(robot.setup.decomposition)
     listed = [made.bodies(mode.q)[body] for mode in found.modes]
     met = [mode.bodies[body] for mode in search(at, robot.observation_model, (body,)).modes]
     assert distance(met, listed, at.model.length) < SAME
@@ -118,7 +118,7 @@ def test_each_pose_is_within_its_radius_of_one_that_fits_all_legs():
     at = robot.setup.configurations[1]
     (system,) = pose_platform(robot, at)
     made, found = solve_posed(robot, at)
-    (body,) = leg_ends(robot.setup.decomposition)
+    (body,) = list_leg_ends(robot.setup.decomposition)
     home = np.linalg.inv(at.pose(body))
     for mode in found.modes:
         moved = made.bodies(mode.q)[body] @ home
@@ -232,7 +232,7 @@ def test_three_planes_and_three_spheres_have_forty():
 def test_legs_that_are_not_watched_are_not_forgotten():
     """Three legs that let the platform translate alone, of which the watched one leaves it a freedom: the others, which
     are not watched, take it."""
-    setup = observe(mechanism(parse("2(Rt*-Pl-S)+3(Utn-Pl*-Unt)")), ["1"], samples=4)
+    setup = observe(build_mechanism(parse("2(Rt*-Pl-S)+3(Utn-Pl*-Unt)")), ["1"], samples=4)
     found = modes(setup)
     assert found.found.continuous_family is None
     assert found.found.complete
@@ -248,7 +248,7 @@ def test_a_body_that_turns_about_a_point_has_eight_modes(seed: int):
     found = modes(spherical(np.random.default_rng(seed)), real=True)
     assert (found.found.complete, found.found.complex) == (True, 8)
     others = search(
-        found.goal, MeasuredRobot.of_motors(found.setup).observation_model, leg_ends(found.setup.decomposition)
+        found.goal, MeasuredRobot.of_motors(found.setup).observation_model, list_leg_ends(found.setup.decomposition)
     )
     for mode in others.modes:
         assert (
@@ -270,6 +270,6 @@ def test_a_body_that_turns_about_a_point_has_one_mode_where_its_rods_are_watched
         found = modes(spherical(np.random.default_rng(seed)), legs)
         assert (found.found.complete, found.found.complex, len(found.modes)) == (True, 1, 1)
     others = search(
-        found.goal, MeasuredRobot.of_directions(found.setup).observation_model, leg_ends(found.setup.decomposition)
+        found.goal, MeasuredRobot.of_directions(found.setup).observation_model, list_leg_ends(found.setup.decomposition)
     )
     assert len(others.modes) == 1

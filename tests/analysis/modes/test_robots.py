@@ -23,18 +23,18 @@ from hrsynth.analysis.modes.single_loop import solve_loop
 from hrsynth.analysis.modes.solve import SystemModes
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.pose_requests import observe as watched
-from hrsynth.budgets import EFFORT
+from hrsynth.budgets import MODES_TIME_LIMIT_S
 from hrsynth.description import list_robots, load
 from hrsynth.errors import (
     BadRequest,
+    ExternalSolverFailure,
     HrsynthError,
     MissingExtra,
-    PoseNotReached,
-    SystemNotSolved,
+    PoseReachFailure,
     TooLarge,
     UnsupportedLocus,
 )
-from hrsynth.geometry.vectors import Array, inverse, pose, pose_difference
+from hrsynth.geometry.vectors import Array, build_pose, compare_poses, invert_pose
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.mechanism import Joint, JointType, Mechanism
 from hrsynth.mechanism.builder import Builder
@@ -67,7 +67,7 @@ def listed(name: str, observe: Legs | None, real: bool, sample: int | None = Non
         if sample is not None and found.model is not None:
             at = found.setup.motion.pose(found.setup.configurations[sample].pose(found.setup.motion.link))
             found = modes(load(list_robots()[name]), observe, at=at, real=real)
-    except PoseNotReached as error:
+    except PoseReachFailure as error:
         return str(error)
     return found
 
@@ -224,7 +224,7 @@ def test_modes_move_with_the_robot(name: str, observe: Legs | None, real: bool):
     found = listed(name, observe, real)
     assert not isinstance(found, str), found
     moved = modes(transformed(load(list_robots()[name]), R, p), observe, real=real)
-    same_modes(found, moved, pose(p, R))
+    same_modes(found, moved, build_pose(p, R))
 
 
 @pytest.mark.some(1)
@@ -446,8 +446,8 @@ def moved_since_zero(found: AssemblyModes, at: ClosedConfiguration, joint: Joint
     """The turn (rad) or the slide (m) of a joint of one freedom since the zero configuration of the robot (a mode's own
     twin has its zero at the mode), from the poses of its links."""
     links = found.setup.all_samples.start.model.mechanism.links
-    before, after = (at.pose(link) @ inverse(links[link].pose) for link in joint.links)
-    D, axis = inverse(before) @ after, joint.axes[0]
+    before, after = (at.pose(link) @ invert_pose(links[link].pose) for link in joint.links)
+    D, axis = invert_pose(before) @ after, joint.axes[0]
     if joint.type is JointType.PRISMATIC:
         return float(axis @ D[:3, 3])
     across = D[:3, :3] - D[:3, :3].T
@@ -455,7 +455,7 @@ def moved_since_zero(found: AssemblyModes, at: ClosedConfiguration, joint: Joint
 
 
 WAYS = {
-    "tips": partial(solve_tips, as_written=False, time_limit=EFFORT),
+    "tips": partial(solve_tips, as_written=False, time_limit=MODES_TIME_LIMIT_S),
     "conditions": solve_posed,
     "loops": solve_loops,
     "carrier": solve_carried,
@@ -478,7 +478,7 @@ def test_all_ways_list_the_same(name: str):
         goal = setup.all_samples.start
         exact, listed = drift(goal, None, setup.normal.moved), dict[str, tuple[Model, SystemModes]]()
         for way, solved in WAYS.items():
-            with suppress(UnsupportedLocus, SystemNotSolved, TooLarge, MissingExtra):
+            with suppress(UnsupportedLocus, ExternalSolverFailure, TooLarge, MissingExtra):
                 made, found = solved(measured, goal, exact)
                 if found.complete:
                     listed[way] = made, found
@@ -493,7 +493,7 @@ def test_all_ways_list_the_same(name: str):
                 assert (
                     min(
                         max(
-                            pose_difference(X, first.bodies(each.q)[body], goal.model.length)
+                            compare_poses(X, first.bodies(each.q)[body], goal.model.length)
                             for body, X in bodies.items()
                         )
                         for each in one.modes

@@ -16,8 +16,8 @@ from hrsynth.analysis.modes.modes import AssemblyModes
 from hrsynth.analysis.modes.msolve import PACKAGE
 from hrsynth.analysis.modes.search import search
 from hrsynth.catalog.architecture_key import parse
-from hrsynth.catalog.entry import mechanism
-from hrsynth.constraints.pattern import leg_ends
+from hrsynth.catalog.entry import build_mechanism
+from hrsynth.constraints.pattern import list_leg_ends
 from hrsynth.description import list_robots, load
 from hrsynth.mechanism import Mechanism
 
@@ -34,7 +34,7 @@ WORDS = ["(Pk*-Rt-S)+(Rt*-Rt-S)+(S-Rt*-Rt)", "3(Ra!-Ra*-Ph-Rb-Ra)", "3(Ph*-Rz-Pi
 
 @cache
 def robot(name: str) -> Mechanism:
-    return load(list_robots()[name]) if name in list_robots() else mechanism(parse(name), 0)
+    return load(list_robots()[name]) if name in list_robots() else build_mechanism(parse(name), 0)
 
 
 def check_agreement(listed: AssemblyModes) -> None:
@@ -42,7 +42,7 @@ def check_agreement(listed: AssemblyModes) -> None:
     of a platform that only translates)."""
     assert listed.found.complete
     measured = (MeasuredRobot.of_motors if listed.kind == "real" else MeasuredRobot.of_directions)(listed.setup)
-    found = search(listed.goal, measured.observation_model, leg_ends(listed.setup.decomposition))
+    found = search(listed.goal, measured.observation_model, list_leg_ends(listed.setup.decomposition))
     assert found.loose == 0
     for mode in found.modes:
         if not other_branch(listed, mode.configuration):
@@ -91,7 +91,7 @@ def test_a_platform_that_is_a_point_has_modes_at_points():
     mechanism, real = robot_of("planar, a point", 6)
     listed = hrsynth.modes(mechanism, real=real)
     measured = (MeasuredRobot.of_motors if real else MeasuredRobot.of_directions)(listed.setup)
-    bodies = leg_ends(listed.setup.decomposition)
+    bodies = list_leg_ends(listed.setup.decomposition)
     found = search(listed.goal, measured.observation_model, bodies)
     assert listed.found.complete
     assert len(found.modes) == len(listed.modes) == 2
@@ -126,8 +126,8 @@ def test_without_the_solver_the_modes_are_found_and_the_extra_is_named(monkeypat
 
 @pytest.mark.slow
 def test_what_was_found_is_drawn(tmp_path):
-    from hrsynth.present.modes import drawable, picture
+    from hrsynth.present.modes import draw_modes, require_scene
 
     found = hrsynth.modes(robot(WORDS[2]))
-    assert len(drawable(found).placed) == len(found.modes) > 1
-    assert picture(found).startswith(b"\x89PNG")
+    assert len(require_scene(found).placed) == len(found.modes) > 1
+    assert draw_modes(found).startswith(b"\x89PNG")

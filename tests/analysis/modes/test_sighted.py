@@ -24,15 +24,15 @@ from hrsynth.analysis.modes.observation_loci import PlatformObservation, conditi
 from hrsynth.analysis.modes.search import search
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.pose_requests import observe
-from hrsynth.constraints.pattern import leg_ends
+from hrsynth.constraints.pattern import list_leg_ends
 from hrsynth.errors import BadRequest, NoCertificate
 from hrsynth.geometry.vectors import Array
-from hrsynth.mechanism.observations import kinds
+from hrsynth.mechanism.observations import list_kinds
 from mechanism.test_kinds import far
 
 PAGE = Path(__file__).parents[3] / "docs/pages/observations.md"
 SAME = 1e-6
-LISTED = [kind for kind in kinds().values() if kind.kind not in ("encoder", "image_circle")]
+LISTED = [kind for kind in list_kinds().values() if kind.kind not in ("encoder", "image_circle")]
 COUNTED = ("point", "line", "image_line", "distance", "depth", "position", "direction")
 
 
@@ -195,7 +195,7 @@ def test_what_random_starts_of_the_whole_robot_find_is_listed(name: str) -> None
     setup: ObservedRobot = ROBOTS[name]()
     found = modes(setup, at=setup.configurations[0])
     assert found.found.complete
-    bodies = leg_ends(setup.decomposition)
+    bodies = list_leg_ends(setup.decomposition)
     met = [mode.bodies[bodies[0]] for mode in search(found.goal, setup.samples.observation_model, bodies).modes]
     if found.within == "poses with the rotation of this one":  # others are not looked for, and a search meets them
         met = [X for X in met if np.abs(X[:3, :3] - found.goal.pose(bodies[0])[:3, :3]).max() < SAME]
@@ -291,13 +291,13 @@ def test_the_exact_pose_is_within_the_radius(back: bool) -> None:
 
 def test_encoders_of_legs_are_held_with_the_legs() -> None:
     """What is asked by a name of its own is a leg's all the same; so is a point of a link that is platform and leg."""
-    joint = next(joint.name for joint in hrsynth.load("3rrr_m1").joints.values() if joint.actuated)
+    joint = next(joint.name for joint in hrsynth.load("3rrr_m1").joints.values() if joint.is_actuated)
     found = modes("3rrr_m1", sensor=[f"encoder:{joint}", "distance:platform@0.1,0.3,0", "distance:platform@0.3,0,0"])
     assert (found.found.complex, found.found.complete) == (4, True)  # circles about one centre: two shapes, two turns
     other = modes("rrrrr_m1", camera="eye=base@0.3,0.1,0.5", sensor="point:dist_1@0.1,0,0")
     assert (other.found.complete, len(other.modes)) == (True, 2)
     found = search(
-        other.goal, MeasuredRobot.of_directions(other.setup).observation_model, leg_ends(other.setup.decomposition)
+        other.goal, MeasuredRobot.of_directions(other.setup).observation_model, list_leg_ends(other.setup.decomposition)
     )
     assert len(found.modes) == 2
 

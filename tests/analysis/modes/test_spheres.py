@@ -20,7 +20,7 @@ from hrsynth.analysis.modes.loci import Circle, Plane, Point, Sphere
 from hrsynth.analysis.modes.rigid import Spatial
 from hrsynth.analysis.modes.solve import SystemModes, solve
 from hrsynth.description import list_robots, load
-from hrsynth.geometry.vectors import pose, rotation_about, unit
+from hrsynth.geometry.vectors import build_pose, normalise_vector, rotate_about_axis
 from strategies import random_rotation
 
 Rng = np.random.Generator
@@ -115,7 +115,7 @@ def test_all_forty_poses_of_dietmaiers_platform_are_real():
 
 def test_they_move_with_the_base_whose_legs_are_counted_in_any_order():
     system = dietmaier()
-    R, t = rotation_about((1, 2, -1), 0.7), np.array([0.3, -1.0, 2.0])
+    R, t = rotate_about_axis((1, 2, -1), 0.7), np.array([0.3, -1.0, 2.0])
     order = [4, 0, 5, 2, 1, 3]
     moved = Spatial(
         tuple(Sphere(R @ system.curves[k].centre + t, system.curves[k].radius) for k in order), system.tips[order]
@@ -123,7 +123,7 @@ def test_they_move_with_the_base_whose_legs_are_counted_in_any_order():
     after = solve(moved)
     assert after.complete
     for mode in solve(system).modes:
-        assert among(pose(R @ mode.pose[:3, 3] + t, R @ mode.pose[:3, :3]), after) < 1e-6
+        assert among(build_pose(R @ mode.pose[:3, 3] + t, R @ mode.pose[:3, :3]), after) < 1e-6
 
 
 def test_the_shipped_platform_has_twenty_eight():
@@ -163,7 +163,7 @@ def test_a_singular_pose_is_never_called_complete():
         rows = np.array([[*rod, *np.cross(tip, rod)] for rod, tip in zip(rods[:5], tips[:5], strict=True)])
         twist = np.linalg.svd(rows)[2][-1]
         v = twist[:3] + np.cross(twist[3:], tips[5])
-        rod = unit(np.cross(v, rng.normal(size=3)))
+        rod = normalise_vector(np.cross(v, rng.normal(size=3)))
         curves = (*system.curves[:5], Sphere(tips[5] + rod, 1.0))
         found = solve(replace(system, curves=curves), near=False)
         assert not found.complete
@@ -207,11 +207,11 @@ def test_no_bound_is_lower_than_what_is_found():
 def test_parallel_circles_and_planes_keep_their_bounds():
     """Circles about one axis direction: the normals are one point at infinity of the base."""
     rng = np.random.default_rng(2)
-    goal = pose(rng.normal(size=3), random_rotation(rng))
+    goal = build_pose(rng.normal(size=3), random_rotation(rng))
     tips = rng.normal(scale=0.6, size=(4, 3))
     at = goal[:3, 3] + tips @ goal[:3, :3].T
-    n = unit(rng.normal(size=3))
-    circles = tuple(Circle(p - 0.7 * unit(np.cross(n, rng.normal(size=3))), n, 0.7) for p in at[:2])
+    n = normalise_vector(rng.normal(size=3))
+    circles = tuple(Circle(p - 0.7 * normalise_vector(np.cross(n, rng.normal(size=3))), n, 0.7) for p in at[:2])
     spheres = tuple(Sphere(p + rng.normal(size=3), 1.0) for p in at[2:])
     curves = (
         *circles,
@@ -255,7 +255,7 @@ def with_angles(rng: Rng, kinds: str, angles: int) -> Draw:
     """Some vectors of the platform keep their angles with directions of the base."""
     drawn = spatial(rng, kinds)
     arrows, hub = rng.normal(size=(angles, 3)), rng.normal(size=3)
-    planes = tuple(Plane(hub + drawn.goal[:3, :3] @ arrow, unit(rng.normal(size=3))) for arrow in arrows)
+    planes = tuple(Plane(hub + drawn.goal[:3, :3] @ arrow, normalise_vector(rng.normal(size=3))) for arrow in arrows)
     curves, tips = (*drawn.system.curves, *planes), np.vstack([drawn.system.tips, arrows])
     return Draw(Spatial(curves, tips, angles, hub), drawn.goal)
 

@@ -21,9 +21,9 @@ from hrsynth.analysis.modes.pose_coordinate_solver import wholes
 from hrsynth.analysis.modes.quadrics import Balls
 from hrsynth.analysis.modes.rigid import Planar
 from hrsynth.analysis.modes.solve import solve, solve_by_msolve
-from hrsynth.analysis.modes.translating import Articulated, Translating
-from hrsynth.errors import BadRequest, MissingExtra, SystemNotSolved
-from hrsynth.geometry.vectors import rotation_about, unit
+from hrsynth.analysis.modes.translating import ArticulatedPlatform, TranslatingPlatform
+from hrsynth.errors import BadRequest, ExternalSolverFailure, MissingExtra
+from hrsynth.geometry.vectors import normalise_vector, rotate_about_axis
 from strategies import random_rotation
 
 SLOWEST = {
@@ -107,14 +107,14 @@ def test_more_surfaces_than_needed_leave_the_goal_of_a_point(kinds: str):
 
 def test_three_spheres_that_do_not_meet_have_no_real_place():
     spheres = tuple(Sphere((x, y, 0), 0.1) for x, y in ((0, 0), (5, 0), (0, 5)))
-    modes = solve(Translating(spheres, np.zeros((3, 3))))
+    modes = solve(TranslatingPlatform(spheres, np.zeros((3, 3))))
     assert modes.complete
     assert (modes.complex, modes.modes) == (2, ())
 
 
 def test_three_spheres_that_touch_are_singular():
     spheres = tuple(Sphere(2.0 * np.array(e), 2.0) for e in ((1, 0, 0), (-0.6, 0.8, 0), (0, -1, 0)))
-    modes = solve(Translating(spheres, np.zeros((3, 3))))
+    modes = solve(TranslatingPlatform(spheres, np.zeros((3, 3))))
     assert "singular" in str(modes.singular_solutions)
     assert among(np.eye(4), modes) < 1e-6
 
@@ -128,10 +128,10 @@ def test_a_continuum_of_places_is_said(kind: str):
         "one plane": ([Plane(p + R[:, :2] @ rng.normal(size=2), R[:, 2]) for _ in range(3)], 2),
         "one sphere": ([Sphere(p, 0.8)] * 3, 2),
         "one axis": ([Sphere(c, float(np.linalg.norm(c - p - 0.7 * R[:, 0]))) for c in along], 1),
-        "planes of one line": ([Plane(c, unit(np.cross(R[:, 2], rng.normal(size=3)))) for c in along], 1),
+        "planes of one line": ([Plane(c, normalise_vector(np.cross(R[:, 2], rng.normal(size=3)))) for c in along], 1),
     }
     curves, dimension = reaches[kind]
-    modes = solve(Translating(tuple(curves), np.zeros((3, 3))))
+    modes = solve(TranslatingPlatform(tuple(curves), np.zeros((3, 3))))
     assert (modes.continuous_family, modes.complete, modes.modes) == (dimension, False, ())
 
 
@@ -139,12 +139,12 @@ def test_a_continuum_of_places_is_said(kind: str):
 def test_places_move_with_the_base(name: str):
     for seed in range(5):
         system, _ = draw(name, seed)
-        R, t = rotation_about((1, 2, -1), 0.7), np.array([0.3, -1.0, 2.0])
+        R, t = rotate_about_axis((1, 2, -1), 0.7), np.array([0.3, -1.0, 2.0])
         moved: list[Reach] = [
             Sphere(R @ c.centre + t, c.radius) if isinstance(c, Sphere) else Plane(R @ c.centre + t, R @ c.normal)
             for c in system.curves
         ]
-        after = solve(Translating(tuple(moved), system.tips @ R.T))
+        after = solve(TranslatingPlatform(tuple(moved), system.tips @ R.T))
         assert after.complete
         for mode in solve(system).modes:
             assert min(np.abs(R @ mode.q + t - other.q).max() for other in after.modes) < 1e-9
@@ -215,7 +215,7 @@ def test_msolve_is_asked_and_read_in_its_own_words():
 @needs_msolve
 def test_msolve_stops_in_time():
     part = next(wholes(spatial(np.random.default_rng(0), "SSSSSS").system))
-    with pytest.raises(SystemNotSolved, match="no answer within"):
+    with pytest.raises(ExternalSolverFailure, match="no answer within"):
         parametrise(part.equations(), timeout=0.05)
 
 
@@ -247,7 +247,9 @@ def test_too_few_surfaces_leave_a_continuum():
         lambda: Sphere((0, 0, 0), -1.0),
         lambda: Plane((0, 0, 0), (0, 0, 0)),
         lambda: Planar((Sphere((0, 0, 0), 1.0),), np.zeros((1, 2)), np.eye(4)),
-        lambda: Articulated((Sphere((0, 0, 0), 1.0),), np.zeros((1, 3)), (2,), Circle((0, 0, 0), (0, 0, 1), 1.0)),
+        lambda: ArticulatedPlatform(
+            (Sphere((0, 0, 0), 1.0),), np.zeros((1, 3)), (2,), Circle((0, 0, 0), (0, 0, 1), 1.0)
+        ),
     ],
 )
 def test_what_is_no_surface_is_refused(bad):

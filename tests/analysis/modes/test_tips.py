@@ -10,11 +10,11 @@ from hrsynth.analysis.modes.branches import model
 from hrsynth.analysis.modes.loci import Circle, Line, Plane, Point, Sphere
 from hrsynth.analysis.modes.solve import solve
 from hrsynth.analysis.modes.tips import tip_loci
-from hrsynth.analysis.observed import ObservedRobot, motors
+from hrsynth.analysis.observed import ObservedRobot, build_motor_model
 from hrsynth.constraints.pattern import recognise
 from hrsynth.description import list_robots, load
 from hrsynth.errors import UnsupportedLocus
-from hrsynth.kinematics.locked_twists import joint_at
+from hrsynth.kinematics.locked_twists import locate_joint
 from hrsynth.mechanism.legs import decompose
 
 HIDDEN = {
@@ -55,7 +55,7 @@ RODS = (
 
 def confined(name: str, *, real: bool = False, member: int = 1):
     setup = ObservedRobot.of(load(list_robots()[name]))
-    observation_model = motors(setup) if real else setup.samples.observation_model
+    observation_model = build_motor_model(setup) if real else setup.samples.observation_model
     configurations = [each.configuration for each in setup.samples.members]
     pattern = recognise(setup.decomposition, observation_model, configurations)
     return tip_loci(setup.decomposition, observation_model, pattern, configurations[member])
@@ -99,7 +99,7 @@ def test_spheres_have_the_length_of_the_rods():
     ends = {leg.label: leg.joints for leg in decompose(found.goal.model.mechanism).legs}
     poses = {body: found.goal.pose(body) for body in found.bodies}
     for tip in found.tips:
-        centres = [joint_at(found.goal, found.goal.model.mechanism.joints[name])[0] for name in ends[tip.leg]]
+        centres = [locate_joint(found.goal, found.goal.model.mechanism.joints[name])[0] for name in ends[tip.leg]]
         rod = max(np.linalg.norm(a - b) for a in centres for b in centres) * found.goal.model.length
         assert tip.curve.radius == pytest.approx(rod, abs=1e-9)
         end = (poses[tip.body] @ np.append(tip.place, 1.0))[:3]

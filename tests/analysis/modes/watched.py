@@ -11,7 +11,7 @@ from hrsynth.analysis.pose_requests import observe
 from hrsynth.geometry.vectors import Array
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Mechanism
-from hrsynth.mechanism.observations import kinds as known
+from hrsynth.mechanism.observations import list_kinds as known
 from strategies import random_direction, random_rotation
 
 

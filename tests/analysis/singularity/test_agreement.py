@@ -14,20 +14,20 @@ from hypothesis import strategies as st
 import strategies
 from analysis.singularity.found import found
 from analysis.singularity.test_conditions import CASES, HEAVY
-from hrsynth.analysis.singularity.condition_check import Agreement, agreement, weakest
-from hrsynth.analysis.singularity.rank_descent import lose
+from hrsynth.analysis.singularity.condition_check import Agreement, compare_condition, compute_smallest_value
+from hrsynth.analysis.singularity.rank_descent import descend_to_rank_loss
 from hrsynth.analysis.singularity.singularities import Singularity, singularities
 from hrsynth.catalog.architecture_key import parse
-from hrsynth.catalog.geometry import mechanism
-from hrsynth.constraints.condition import Condition, condition
+from hrsynth.catalog.geometry import build_mechanism
+from hrsynth.constraints.condition import Condition, derive_condition
 from hrsynth.constraints.locked_legs import LockedLeg
 from hrsynth.constraints.pattern import ConstraintPattern, PatternValues
 from hrsynth.description import list_robots, load
 from hrsynth.errors import BadRequest, Disagreement
 from hrsynth.geometry.vectors import Array
-from hrsynth.kinematics.walking import random_walk
+from hrsynth.kinematics.walking import walk_randomly
 from hrsynth.mechanism import Mechanism
-from hrsynth.tolerances import RANK_CUTOFF, RANK_GAP
+from hrsynth.tolerances import RANK_CUTOFF_FRACTION, RANK_GAP_MIN
 
 ANGLE = 1e-8
 
@@ -46,7 +46,7 @@ def check(answer: Singularity, points: int) -> None:
     if answer.condition.never:
         assert checked.on_locus == ()
     for each in answer.examples:
-        assert each.sigma < RANK_CUTOFF < each.nearby
+        assert each.sigma < RANK_CUTOFF_FRACTION < each.nearby
         assert each.unobserved
 
 
@@ -135,7 +135,7 @@ def check_random_robot(robot: Mechanism, seed: int, real: bool, points: int) -> 
 
 
 def again(answer: Singularity, pattern: ConstraintPattern, wrong: Condition, points: int = 60) -> Agreement:
-    return agreement(answer.setup.samples.start, answer.observation_model, pattern, wrong, points)
+    return compare_condition(answer.setup.samples.start, answer.observation_model, pattern, wrong, points)
 
 
 def with_leg(pattern: ConstraintPattern, leg: LockedLeg) -> ConstraintPattern:
@@ -160,7 +160,7 @@ def test_another_tip_is_told(robot: Sequence[str]) -> None:
     answer = found(*robot)
     wrong = with_leg(answer.pattern, elsewhere(answer))
     with pytest.raises(Disagreement) as caught:
-        again(answer, wrong, condition(wrong, answer.observation_model))
+        again(answer, wrong, derive_condition(wrong, answer.observation_model))
     assert caught.value.angle > 1e-3
     assert answer.setup.mechanism.name in str(caught.value)
 
@@ -173,7 +173,7 @@ def test_another_line_is_told(robot: Sequence[str]) -> None:
     answer = found(*robot)
     wrong = with_leg(answer.pattern, of_another(answer))
     with pytest.raises(Disagreement) as caught:
-        again(answer, wrong, condition(wrong, answer.observation_model))
+        again(answer, wrong, derive_condition(wrong, answer.observation_model))
     assert caught.value.angle > 1e-3
 
 
@@ -216,7 +216,7 @@ def test_a_false_never_is_told_though_no_pose_that_was_drawn_is_singular(
     robot: str, legs: str | None, real: bool
 ) -> None:
     answer = found(robot, legs, real=real)
-    assert answer.checked.smallest > RANK_CUTOFF * RANK_GAP
+    assert answer.checked.smallest > RANK_CUTOFF_FRACTION * RANK_GAP_MIN
     with pytest.raises(Disagreement) as caught:
         again(answer, answer.pattern, Never("never", sympy.Integer(1), never=True), 20)
     assert caught.value.poses > 0
@@ -234,20 +234,20 @@ def test_where_the_rank_is_led_to_zero_the_expression_vanishes(robot: str, legs:
     start = answer.setup.samples.start
     ends = [
         at
-        for drawn in random_walk(start, 40, 3, steps=8)
-        if (at := lose(drawn, answer.observation_model)) is not None
+        for drawn in walk_randomly(start, 40, 3, steps=8)
+        if (at := descend_to_rank_loss(drawn, answer.observation_model)) is not None
         and at.kernel()[1].weakest > 0.05 * start.kernel()[1].weakest
     ]
     assert len(ends) > 4
     for at in ends:
-        assert weakest(at, answer.observation_model) < RANK_CUTOFF
+        assert compute_smallest_value(at, answer.observation_model) < RANK_CUTOFF_FRACTION
         assert abs(answer.condition.evaluate(answer.pattern.values_at([at]))[0]) < 1e-6
 
 
 @pytest.mark.slow
 def test_the_rank_is_not_led_into_another_operation_mode() -> None:
     """Steps that closed the loops anew led this platform from translations to turns, in which it loses one."""
-    answer = singularities(mechanism(parse("3(Ra!-Rb*-Rb-Ra-Ra)"), 0), real=True, points=60)
+    answer = singularities(build_mechanism(parse("3(Ra!-Rb*-Rb-Ra-Ra)"), 0), real=True, points=60)
     assert answer.condition.never
     assert answer.checked.disagreements == 0
 

@@ -10,12 +10,12 @@ import pytest
 
 from analysis.singularity.found import found
 from hrsynth.analysis.singularity.singularities import singularities
-from hrsynth.constraints.condition import _general
-from hrsynth.constraints.vector_algebra import products, vector
+from hrsynth.constraints.condition import _derive_general
+from hrsynth.constraints.vector_algebra import load_products, make_vector
 from hrsynth.description import list_robots, load
-from hrsynth.geometry.vectors import inverse
-from hrsynth.kinematics.velocity_relation import relation
-from hrsynth.kinematics.walking import random_walk
+from hrsynth.geometry.vectors import invert_pose
+from hrsynth.kinematics.velocity_relation import compute_relation
+from hrsynth.kinematics.walking import walk_randomly
 from hrsynth.present.show import text
 
 
@@ -201,13 +201,13 @@ def test_with_the_camera_on_the_platform_the_tips_are_the_lower_joints() -> None
     mechanism = load("gough_stewart")
     for leg in answer.pattern.legs:
         foot = next(joint for joint in mechanism.joints_of(mechanism.base) if joint.name.endswith(leg.label))
-        place = inverse(mechanism.links[leg.tip.link].pose) @ np.append(foot.point, 1)
+        place = invert_pose(mechanism.links[leg.tip.link].pose) @ np.append(foot.point, 1)
         np.testing.assert_allclose(leg.tip.place * mechanism.length, place[:3], atol=1e-12)
 
 
 def test_signs_come_with_the_order_of_a_triple_product() -> None:
-    _, cross, det = products()
-    a, b, c = map(vector, "abc")
+    _, cross, det = load_products()
+    a, b, c = map(make_vector, "abc")
     assert det(a, b, c) == det(b, c, a) == det(c, a, b) == -det(b, a, c) == -det(a, c, b) == -det(c, b, a)
     assert cross(a, b) != cross(b, a)
 
@@ -215,7 +215,7 @@ def test_signs_come_with_the_order_of_a_triple_product() -> None:
 def test_a_condition_without_named_wrenches_defines_its_symbols_and_tells_no_angle():
     """Of a robot whose legs have no named wrenches; with names the angle is told."""
     answer = found("3rrr_m1")
-    general = replace(answer, condition=_general(answer.observation_model))
+    general = replace(answer, condition=_derive_general(answer.observation_model))
     assert "named wrenches" in text(answer)
     assert "named wrenches" not in text(general)
     for meaning in general.condition.where.values():
@@ -251,8 +251,8 @@ def test_as_many_freedoms_are_lost_everywhere_but_not_the_named_ones(robot: str,
     assert "(at the zero configuration)" in answer.words
     start, scale = answer.setup.all_samples.start, np.repeat([1 / answer.setup.mechanism.length, 1.0], 3)[:, None]
     seen = []
-    for at in (start, *random_walk(start, 12, seed=8)):
-        lost = relation(at, answer.observation_model).unobserved_twists
+    for at in (start, *walk_randomly(start, 12, seed=8)):
+        lost = compute_relation(at, answer.observation_model).unobserved_twists
         lost = np.vstack([lost, np.zeros((6 - len(lost), lost.shape[1]))])
         assert lost.shape[1] >= count
         scaled = scale * named

@@ -10,9 +10,9 @@ import pytest
 import sympy
 
 from analysis.singularity.found import found
-from hrsynth.constraints.condition import Named
+from hrsynth.constraints.condition import NamedCondition
 from hrsynth.constraints.named_vectors import Tangent
-from hrsynth.constraints.vector_algebra import evaluate, products, vector
+from hrsynth.constraints.vector_algebra import evaluate, load_products, make_vector
 from hrsynth.geometry.screws import force
 
 SEEDS = range(4)
@@ -21,7 +21,7 @@ Vectors = dict[str, sympy.Matrix]
 
 def components(expression: Any) -> Any:
     """The expression as a polynomial in coordinates ``u1_x`` … of its vectors."""
-    dot, cross, det = products()
+    dot, cross, det = load_products()
 
     def expand(node: Any) -> Any:
         if isinstance(node, sympy.Symbol):
@@ -240,12 +240,12 @@ def test_numbers_and_polynomials_are_the_same(case: tuple[str, ...], real: bool)
 
 
 def test_a_triple_product_has_the_sign_of_its_order() -> None:
-    _, _, det = products()
+    _, _, det = load_products()
     names = ("a", "b", "c")
     values = {name: np.random.default_rng(2).normal(size=(1, 3)) for name in names}
     for order in permutations(names):
         wanted = np.linalg.det(np.vstack([values[name] for name in order]))
-        assert evaluate(det(*map(vector, order)), values)[0] == pytest.approx(wanted)
+        assert evaluate(det(*map(make_vector, order)), values)[0] == pytest.approx(wanted)
 
 
 @pytest.mark.some(1)
@@ -274,7 +274,7 @@ def test_the_length_of_a_crank_is_a_factor_and_nothing_more(case: tuple[str, ...
 def test_the_factors_that_were_split_off_never_vanish(case: tuple[str, ...]) -> None:
     """|a × (Q − P)| is the same at all poses: the length of a crank."""
     answer = found(*case)
-    assert isinstance(answer.condition, Named)
+    assert isinstance(answer.condition, NamedCondition)
     members = [member.configuration for member in answer.setup.samples.members]
     poses = answer.pattern.values_at(members)._poses
     for leg in answer.pattern.legs:

@@ -9,7 +9,7 @@ import pytest
 
 from analysis.singularity.found import found
 from hrsynth.analysis.singularity.singularities import Example, Singularity
-from hrsynth.geometry.vectors import Array, inverse, unit
+from hrsynth.geometry.vectors import Array, invert_pose, normalise_vector
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from kinematics.robots import state_of
 from oracle import Oracle
@@ -23,7 +23,7 @@ SHARP = 1e-9
 def carried(at: ClosedConfiguration, point: Array, link: str) -> Array:
     """Where a point of a link at the zero configuration is now (metres)."""
     zero = at.model.mechanism.links[link].pose
-    moved = at.pose(link) @ inverse(zero) @ np.append(point, 1.0)
+    moved = at.pose(link) @ invert_pose(zero) @ np.append(point, 1.0)
     return np.asarray(moved[:3])
 
 
@@ -78,8 +78,8 @@ def test_the_oracle_sees_the_same_lost_freedom(case: tuple[str, ...]) -> None:
         idle = right[int(np.sum(values > 1e-7)) :].T
         U, sizes, _ = np.linalg.svd(basis[:6] @ idle)
         assert int(np.sum(sizes > 1e-6)) == 1
-        assert np.linalg.norm(np.cross(U[:3, 0], unit(the_lost(each))[:3])) < 1e-6
-        assert abs(U[:, 0] @ unit(the_lost(each))) == pytest.approx(1, abs=1e-9)
+        assert np.linalg.norm(np.cross(U[:3, 0], normalise_vector(the_lost(each))[:3])) < 1e-6
+        assert abs(U[:, 0] @ normalise_vector(the_lost(each))) == pytest.approx(1, abs=1e-9)
 
 
 def test_fig_8_the_lines_along_the_cranks_meet_and_the_platform_turns_about_that_point() -> None:
@@ -87,7 +87,7 @@ def test_fig_8_the_lines_along_the_cranks_meet_and_the_platform_turns_about_that
     for each in examples("3rrr_m1"):
         at, lost = each.configuration, the_lost(each)
         tips = [centre(at, f"wrist_{i}") for i in "123"]
-        cranks = [unit(centre(at, f"elbow_{i}") - centre(at, f"shoulder_{i}")) for i in "123"]
+        cranks = [normalise_vector(centre(at, f"elbow_{i}") - centre(at, f"shoulder_{i}")) for i in "123"]
         across = np.array([np.cross([0, 0, 1.0], crank)[:2] for crank in cranks])
         offsets = np.array([row @ tip[:2] for row, tip in zip(across, tips, strict=True)])
         point = np.append(np.linalg.lstsq(across, offsets, rcond=None)[0], tips[0][2])
@@ -103,8 +103,8 @@ def test_fig_10b_four_planes_meet_in_a_point() -> None:
     for each in examples("gough_stewart", "1,2,3"):
         at, lost = each.configuration, the_lost(each)
         tips = [centre(at, f"wrist_{i}") for i in "123"]
-        rods = [unit(tip - centre(at, f"shoulder_{i}")) for i, tip in zip("123", tips, strict=True)]
-        normal = unit(np.cross(tips[1] - tips[0], tips[2] - tips[0]))
+        rods = [normalise_vector(tip - centre(at, f"shoulder_{i}")) for i, tip in zip("123", tips, strict=True)]
+        normal = normalise_vector(np.cross(tips[1] - tips[0], tips[2] - tips[0]))
         normals = [*rods, normal]
         planes = np.array([[*n, -n @ (tip - tips[0])] for n, tip in zip(normals, [*tips, tips[0]], strict=True)])
         values = np.linalg.svd(planes, compute_uv=False)
@@ -118,13 +118,13 @@ def tangent(at: ClosedConfiguration, leg: str) -> Array:
     """The unit tangent of the elbow's path, midway between the two balls, from the file's joints."""
     shoulder = at.model.mechanism.joints[f"shoulder_{leg}"]
     elbow = (centre(at, f"elbow_{leg}a") + centre(at, f"elbow_{leg}b")) / 2
-    return unit(np.cross(shoulder.axis, elbow - shoulder.point))
+    return normalise_vector(np.cross(shoulder.axis, elbow - shoulder.point))
 
 
 @pytest.mark.parametrize(("case", "legs"), [(("quattro_rigid", "1,4"), "14"), (("quattro_rigid",), "1234")])
 def test_fig_16_the_tangents_are_parallel_and_the_platform_moves_along_them(case: tuple[str, ...], legs: str) -> None:
     for each in examples(*case):
-        at, lost = each.configuration, unit(the_lost(each))
+        at, lost = each.configuration, normalise_vector(the_lost(each))
         np.testing.assert_allclose(lost[3:], 0, atol=1e-8)
         for leg in legs:
             assert np.linalg.norm(np.cross(tangent(at, leg), lost[:3])) < 1e-7
@@ -136,7 +136,7 @@ def test_the_halves_of_the_articulated_platform() -> None:
         at = each.configuration
         hinges = [j for j in at.model.mechanism.joints.values() if j.name.startswith("hinge_")]
         one, two = (centre(at, joint.name) for joint in hinges)
-        e = unit(np.cross([0, 0, 1.0], two - one))
+        e = normalise_vector(np.cross([0, 0, 1.0], two - one))
         assert abs(np.linalg.det([tangent(at, "1"), tangent(at, "4"), e])) < 1e-8
         assert np.linalg.norm(np.cross(tangent(at, "1"), tangent(at, "4"))) > CLEAR
 

@@ -15,19 +15,19 @@ from analysis.singularity.found import found
 from analysis.singularity.test_figures import centre
 from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.analysis.singularity.locus import Locus, frame_plane
-from hrsynth.analysis.singularity.locus import locus as drawn
+from hrsynth.analysis.singularity.locus import Locus, choose_plane_grid
+from hrsynth.analysis.singularity.locus import compute_locus as drawn
 from hrsynth.analysis.singularity.rank_curve import PlaneOfPoses
-from hrsynth.batch.pose_continuation import reach, sweep
-from hrsynth.budgets import COARSE_GRID, LOCUS_SIDES
+from hrsynth.batch.pose_continuation import sweep, track_to_pose
+from hrsynth.budgets import COARSE_GRID_SIDE_COUNT, LOCUS_SIDES
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, NoReachablePose
-from hrsynth.geometry.vectors import unit
+from hrsynth.geometry.vectors import normalise_vector
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.platform_motion import PlatformMotion
 from hrsynth.mechanism.pose import Pose
 from hrsynth.present import palette
-from hrsynth.present.maps import _boundary, _drawn_locus, locus_map
+from hrsynth.present.maps import _draw_boundary, _draw_locus_curve, draw_locus_map
 from hrsynth.present.plots import MapPlane
 
 STEPS = 15
@@ -42,13 +42,13 @@ def posed(x: float, y: float) -> ClosedConfiguration:
     samples = found("3rrr_m1").setup.samples
     configurations = [samples.start, *(member.configuration for member in samples.members)]
     motion = PlatformMotion.of(configurations, samples.observation_model)
-    return reach(samples.start, samples.observation_model, Pose(x=x, y=y, phi=0.0), motion)
+    return track_to_pose(samples.start, samples.observation_model, Pose(x=x, y=y, phi=0.0), motion)
 
 
 def lines(at: ClosedConfiguration, begin: str, end: str) -> float:
     """The determinant of three lines through the tips along begin-end (characteristic lengths), for a normal +z."""
     tips = [centre(at, f"wrist_{i}")[:2] / at.model.length for i in "123"]
-    along = [unit(centre(at, f"{end}_{i}") - centre(at, f"{begin}_{i}"))[:2] for i in "123"]
+    along = [normalise_vector(centre(at, f"{end}_{i}") - centre(at, f"{begin}_{i}"))[:2] for i in "123"]
     return float(np.linalg.det([[*d, tip[0] * d[1] - tip[1] * d[0]] for d, tip in zip(along, tips, strict=True)]))
 
 
@@ -97,11 +97,11 @@ def test_the_picture_shows_the_loci() -> None:
     import matplotlib.image
     from matplotlib.colors import to_rgb
 
-    data = locus_map(found("3rrr_m1"), planar())
+    data = draw_locus_map(found("3rrr_m1"), planar())
     assert data.startswith(b"\x89PNG\r\n\x1a\n")
     pixels = matplotlib.image.imread(io.BytesIO(data))[..., :3]
     assert min(pixels.shape[:2]) > 300
-    for colour in (palette.colour("actuator"), palette.PAGE["ink"]):
+    for colour in (palette.get_colour("actuator"), palette.PAGE["ink"]):
         assert np.sum(np.all(np.abs(pixels - to_rgb(colour)) < 0.06, axis=2)) > 100
 
 
@@ -125,7 +125,7 @@ def test_the_edge_of_the_map_is_no_limit_of_reach() -> None:
     assert part.reached == 9
     for each, marked in ((part, False), (locus, True)):
         plane = MapPlane.of(each.grid.axes, found("3rrr_m1").setup.motion, 0.4, 1.6)
-        assert bool(_boundary(Figure().subplots(), plane, each)) == marked
+        assert bool(_draw_boundary(Figure().subplots(), plane, each)) == marked
 
 
 @pytest.mark.parametrize(
@@ -142,7 +142,7 @@ def test_what_is_not_met_on_the_grid_is_not_called_never(locus: Callable[[], Loc
 
     def told(each: Locus) -> str:
         plane = MapPlane.of(each.grid.axes, found("3rrr_m1").setup.motion, 0.4, 1.6)
-        return _drawn_locus(Figure().subplots(), plane, each.hidden, "hidden robot").get_label()
+        return _draw_locus_curve(Figure().subplots(), plane, each.hidden, "hidden robot").get_label()
 
     whole = locus()
     assert told(whole) == words
@@ -190,7 +190,7 @@ def test_where_the_smallest_value_passes_through_zero_the_expression_does(
     for piece in pieces:
         for end in piece:
             near = min(reached, key=lambda place: np.linalg.norm(np.subtract(place, end)))
-            at = reach(reached[near], setup.samples.observation_model, located.grid.pose(end.tolist()), motion)
+            at = track_to_pose(reached[near], setup.samples.observation_model, located.grid.pose(end.tolist()), motion)
             assert abs(measured.condition.evaluate(measured.pattern.values_at([at]))[0]) < 0.03 * size
     cell = np.array([x[1] - x[0], y[1] - y[0]])
     changes = [
@@ -222,7 +222,7 @@ def test_thin_tips_are_within_the_window(degrees: int) -> None:
         needle = (along >= 0) & (along <= 1.9 * length) & (np.abs(across) <= along * np.tan(np.radians(10)))
         return needle | (np.linalg.norm(places - centre, axis=1) <= radius)
 
-    grid = frame_plane(
+    grid = choose_plane_grid(
         setup.all_samples.start,
         setup.all_samples.observation_model,
         motion,
@@ -230,7 +230,7 @@ def test_thin_tips_are_within_the_window(degrees: int) -> None:
         5,
         lambda _, cells: inside(cells.places()),
     )
-    step = 2 * LOCUS_SIDES[0] * length / (COARSE_GRID - 1)
+    step = 2 * LOCUS_SIDES[0] * length / (COARSE_GRID_SIDE_COUNT - 1)
     corners = np.stack([end, centre + radius, centre - radius])
     window = np.array([[values[0], values[-1]] for _, values in grid.axes]).T
     assert (window[0] <= corners.min(axis=0)).all()

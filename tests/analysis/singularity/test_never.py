@@ -13,17 +13,17 @@ from scipy.spatial.transform import Rotation
 from analysis.singularity.found import found
 from hrsynth.analysis.aspects.path import path
 from hrsynth.analysis.check import check
-from hrsynth.analysis.singularity.condition_check import weakest
+from hrsynth.analysis.singularity.condition_check import compute_smallest_value
 from hrsynth.analysis.singularity.singularities import Singularity, singularities
 from hrsynth.catalog.architecture_key import parse
-from hrsynth.catalog.geometry import mechanism
+from hrsynth.catalog.geometry import build_mechanism
 from hrsynth.description import load
 from hrsynth.errors import BadRequest
-from hrsynth.geometry.vectors import Array, frozen, inverse, unit
-from hrsynth.kinematics.walking import random_walk
+from hrsynth.geometry.vectors import Array, freeze_array, invert_pose, normalise_vector
+from hrsynth.kinematics.walking import walk_randomly
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Mechanism
-from hrsynth.present.text.poses import singularity
+from hrsynth.present.text.poses import format_singularity
 from oracle import Oracle
 from strategies import deltas
 
@@ -37,7 +37,7 @@ def mixed(seed: int, off: float | None) -> Mechanism:
         return robot
     across = np.cross(crank.axes[0], rail.axes[0])
     p = off * crank.axes[0] + np.sqrt(1 - off**2) * across / np.linalg.norm(across)
-    return replace(robot, joints={**robot.joints, rail.name: replace(rail, axes=(frozen(p),))})
+    return replace(robot, joints={**robot.joints, rail.name: replace(rail, axes=(freeze_array(p),))})
 
 
 def told(robot: Mechanism) -> Singularity:
@@ -50,8 +50,8 @@ def tangents(answer: Singularity) -> tuple[Array, Array, Array]:
     p, a = (robot.joints[f"motor_joint_{i}"].axes[0] for i in (1, 2))
     elbow, centre = robot.joints["elbow_2a"].point, robot.joints["motor_joint_2"].point
     arm = "arm_2"
-    back = inverse(start.pose(arm)) @ np.append(elbow, 1.0)
-    places = [(at.pose(arm) @ back)[:3] for at in random_walk(start, 80, seed=3)]
+    back = invert_pose(start.pose(arm)) @ np.append(elbow, 1.0)
+    places = [(at.pose(arm) @ back)[:3] for at in walk_randomly(start, 80, seed=3)]
     tau = np.cross(a, np.array(places) - centre)
     return p, a, tau / np.linalg.norm(tau, axis=1, keepdims=True)
 
@@ -66,7 +66,10 @@ def test_a_rail_that_is_not_normal_to_a_cranks_axis_is_never_parallel_to_its_tan
     assert answer.condition.never
     p, a, tau = tangents(answer)
     assert np.linalg.norm(np.cross(tau, p), axis=1).min() >= abs(p @ a) - 1e-9
-    sizes = [weakest(at, answer.observation_model) for at in random_walk(answer.setup.all_samples.start, 40, seed=5)]
+    sizes = [
+        compute_smallest_value(at, answer.observation_model)
+        for at in walk_randomly(answer.setup.all_samples.start, 40, seed=5)
+    ]
     assert min(sizes) > 0
 
 
@@ -103,7 +106,7 @@ def test_planar_robots_have_one():
 def test_what_is_not_found_is_not_said_not_to_be():
     answer = found("quattro_rigid", "1,3")
     assert answer.checked is not None
-    text = singularity(replace(answer, examples=()))
+    text = format_singularity(replace(answer, examples=()))
     assert f"not found by {answer.checked.searches} searches, which does not mean that there are none" in text
     assert "no pose" not in text
 
@@ -113,8 +116,8 @@ def sliding_leg(random: np.random.Generator, k: int) -> tuple[Array, Array, Arra
     t = 2 * np.pi * k / 3
     b = np.array([0.5 * np.cos(t), 0.5 * np.sin(t), -0.1]) + random.normal(size=3) * 0.03
     c = np.array([0.08 * np.cos(t), 0.08 * np.sin(t), -0.4]) + random.normal(size=3) * 0.02
-    a = unit(np.array([-np.sin(t), np.cos(t), 0.0]) + random.normal(size=3) * 0.35)
-    return b, c, a, unit(np.array([np.cos(t), np.sin(t), -0.3]) + random.normal(size=3) * 0.2)
+    a = normalise_vector(np.array([-np.sin(t), np.cos(t), 0.0]) + random.normal(size=3) * 0.35)
+    return b, c, a, normalise_vector(np.array([np.cos(t), np.sin(t), -0.3]) + random.normal(size=3) * 0.2)
 
 
 def sliding_platform(watched: float) -> tuple[str, Array, list[Array], list[Array]]:
@@ -124,7 +127,7 @@ def sliding_platform(watched: float) -> tuple[str, Array, list[Array], list[Arra
     rails, firsts, rods = [], [], []
     for k in range(3):
         b, c, a, rail = sliding_leg(random, k)
-        rod, second = c - b, unit(np.cross(a, c - b))
+        rod, second = c - b, normalise_vector(np.cross(a, c - b))
         for kind, name, parent, child, at, axis in (
             ("prismatic", "g", "base", "s", b, rail),
             ("continuous", "e{}__1", "s", "h", 0 * b, a),
@@ -154,7 +157,9 @@ def sliding_platform(watched: float) -> tuple[str, Array, list[Array], list[Arra
         rails.append(rail)
         firsts.append(a)
         rods.append(rod)
-        ends.append(unit(rod) if k else unit(unit(rod) + watched * a * np.sign(a @ rod)))
+        ends.append(
+            normalise_vector(rod) if k else normalise_vector(normalise_vector(rod) + watched * a * np.sign(a @ rod))
+        )
     seen = "".join(f'<observe leg="{k + 1}" link="r{k}" axis="{text(u)}"/>' for k, u in enumerate(ends))
     told = f'<hrsynth><platform link="top"/>{seen}</hrsynth>'
     file = f'<robot name="puu"><link name="base"/>{"".join(rows)}{told}</robot>'
@@ -169,7 +174,7 @@ def singular_place(u: Array, rails: list[Array], leg: list[Array]) -> Array:
     """Where (3,) the platform is when u lies along the first axis of leg 1's U joint, and its rod
     can then turn its end along the rail of leg 2 but for a motion of its own slide."""
     a, rod, home = leg
-    b = unit(np.cross(a, rod))
+    b = normalise_vector(np.cross(a, rod))
     goal = a * np.sign(u @ a)
     folded = Rotation.from_rotvec(b * np.arctan2(np.cross(u, goal) @ b, u @ goal)).apply(rod)
     n = np.cross(rails[0], rails[1])
@@ -204,7 +209,7 @@ def test_a_u_joint_that_turns_about_what_is_watched_is_seen(watched: float, tmp_
 
 @pytest.mark.parametrize(("name", "legs"), [("linear_delta", "1, 2, 3"), ("3puu", ""), ("prrrp_m1", "")])
 def test_legs_that_may_fold_are_named_where_never_is_said(name: str, legs: str):
-    told = " ".join(singularity(found(name, None)).split())
+    told = " ".join(format_singularity(found(name, None)).split())
     assert "never" in told
     flat = f"a loop inside a leg ({legs}) is flat, and those beyond, at which it has another assembly mode"
     assert (flat in told) == bool(legs)
@@ -215,7 +220,7 @@ def couples(at: Array) -> Array:
     robot, held = load("3upu"), []
     for k in "123":
         foot, tip = robot.joints[f"shoulder_{k}"], robot.joints[f"wrist_{k}"].point + at
-        held.append(unit(np.cross(foot.axes[0], np.cross(foot.axes[0], tip - foot.point))))
+        held.append(normalise_vector(np.cross(foot.axes[0], np.cross(foot.axes[0], tip - foot.point))))
     return np.array(held)
 
 
@@ -225,7 +230,7 @@ def test_never_does_not_speak_of_constraint_singularities() -> None:
     assert answer.condition is not None
     assert answer.condition.never
     assert any("constraint singularities" in each for each in answer.unexamined)
-    assert "constraint singularities" in singularity(answer)
+    assert "constraint singularities" in format_singularity(answer)
     draws = 0.5 * np.random.default_rng(0).normal(size=(500, 3))
     home, here = np.linalg.det(couples(np.zeros(3))), sorted(draws, key=lambda x: float(np.linalg.norm(x)))
     ray = next(x for x in here if np.linalg.det(couples(x)) * home < 0)
@@ -243,7 +248,7 @@ def test_constraint_singularities_are_not_named_where_legs_cannot_turn_the_platf
         made.link(link)
     random = np.random.default_rng(1)
     for k in range(3):
-        a, places = unit(np.eye(3)[k] + 0.2 * random.normal(size=3)), random.normal(size=(4, 3))
+        a, places = normalise_vector(np.eye(3)[k] + 0.2 * random.normal(size=3)), random.normal(size=(4, 3))
         bodies = ("base", f"s{k}", f"u{k}", f"d{k}", "platform")
         for n, kind in enumerate("PRRR"):
             made.joint(
@@ -259,16 +264,17 @@ def test_constraint_singularities_are_not_named_where_legs_cannot_turn_the_platf
 def test_what_is_fixed_in_a_platform_that_translates_is_constant(up: float) -> None:
     """Depth and a line of the platform: a translation keeps both where it is along the line and in a plane z = const.,
     so there is none at all if the line is not in such a plane, and one everywhere else."""
-    axis = unit(np.array([1.0, 0.3, up]))
+    axis = normalise_vector(np.array([1.0, 0.3, up]))
     seen = ["depth:platform@0.1,0,0", f"line:platform@0.1,0.1,0/{text(axis).replace(' ', ',')}"]
-    answer = singularities(mechanism(parse("3(Pk*-Ra-Ra-Ra)"), 0), sensor=seen, points=30)
+    answer = singularities(build_mechanism(parse("3(Pk*-Ra-Ra-Ra)"), 0), sensor=seen, points=30)
     z = answer.setup.mechanism.links["platform"].pose[:3, :3] @ axis @ np.array([0.0, 0.0, 1.0])
     assert (abs(z) > 0.1) == (up > 0.0)
     assert answer.always == (up == 0.0)
     assert (answer.condition is not None and answer.condition.never) == (up > 0.0)
     if up:
         sizes = [
-            weakest(at, answer.observation_model) for at in random_walk(answer.setup.all_samples.start, 30, seed=5)
+            compute_smallest_value(at, answer.observation_model)
+            for at in walk_randomly(answer.setup.all_samples.start, 30, seed=5)
         ]
         assert min(sizes) > 1e-3
 

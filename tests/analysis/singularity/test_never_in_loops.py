@@ -12,7 +12,7 @@ from scipy.linalg import null_space
 from analysis.singularity.test_never import singular_place, sliding_leg, sliding_platform, text
 from hrsynth.analysis.check import check
 from hrsynth.analysis.singularity.singularities import Singularity, singularities
-from hrsynth.geometry.vectors import Array, unit
+from hrsynth.geometry.vectors import Array, normalise_vector
 
 
 def joint(name: str, kind: str, parent: str, child: str, at: Array, axis: Array) -> str:
@@ -36,8 +36,8 @@ def parallelograms(watched: float) -> tuple[str, Array, list[Array], list[Array]
     zero = np.zeros(3)
     for k in range(3):
         b, c, a, rail = sliding_leg(random, k)
-        rod, second = c - b, unit(np.cross(a, c - b))
-        w = 0.06 * a + 0.01 * unit(np.cross(second, a))
+        rod, second = c - b, normalise_vector(np.cross(a, c - b))
+        w = 0.06 * a + 0.01 * normalise_vector(np.cross(second, a))
         rows += [
             joint(f"g{k}", "prismatic", "base", f"s{k}", b, rail),
             joint(f"e{k}", "continuous", f"s{k}", f"h{k}", zero, a),
@@ -54,7 +54,9 @@ def parallelograms(watched: float) -> tuple[str, Array, list[Array], list[Array]
         rails.append(rail)
         firsts.append(a)
         rods.append(rod)
-        ends.append(unit(rod) if k else unit(unit(rod) + watched * a * np.sign(a @ rod)))
+        ends.append(
+            normalise_vector(rod) if k else normalise_vector(normalise_vector(rod) + watched * a * np.sign(a @ rod))
+        )
     seen = "".join(f'<observe leg="{k + 1}" link="r{k}" axis="{text(u)}"/>' for k, u in enumerate(ends))
     file = f'<robot name="pi"><link name="base"/>{"".join(rows)}<hrsynth><platform link="top"/>{seen}</hrsynth></robot>'
     return file, ends[0], rails, [firsts[0], rods[0], home]
@@ -104,8 +106,8 @@ def four_bar(watched: str) -> str:
         f'<robot name="four"><link name="base"/>{"".join(rows)}'
         f'<transmission name="t1"><joint name="a"/></transmission>'
         f'<transmission name="t2"><joint name="e"/></transmission><hrsynth><platform link="top"/>'
-        f'<observe leg="1" link="{watched}" axis="{text(unit(B - A))}"/>'
-        f'<observe leg="2" link="rod" axis="{text(unit(Q - E))}"/></hrsynth></robot>'
+        f'<observe leg="1" link="{watched}" axis="{text(normalise_vector(B - A))}"/>'
+        f'<observe leg="2" link="rod" axis="{text(normalise_vector(Q - E))}"/></hrsynth></robot>'
     )
 
 
@@ -157,13 +159,15 @@ def test_a_second_direction_of_a_leg_may_fail_where_the_first_holds(tmp_path: Pa
     file, _, _, (a, _, _) = sliding_platform(0.8)
     tree = ElementTree.fromstring(file)
     slide, bend = (next(each for each in tree.iter("joint") if each.get("name") == name) for name in ("g0", "e0__1"))
-    arm = 0.3 * unit(np.cross(a, Z))
+    arm = 0.3 * normalise_vector(np.cross(a, Z))
     slide.set("type", "continuous")
     (foot, turn), elbow = (next(slide.iter(each)) for each in ("origin", "axis")), next(bend.iter("origin"))
     foot.set("xyz", text(np.array([float(x) for x in foot.attrib["xyz"].split()]) - arm))
     turn.set("xyz", text(a))
     elbow.set("xyz", text(arm))
-    next(tree.iter("hrsynth")).append(ElementTree.Element("observe", leg="1", link="s0", axis=text(unit(arm))))
+    next(tree.iter("hrsynth")).append(
+        ElementTree.Element("observe", leg="1", link="s0", axis=text(normalise_vector(arm)))
+    )
     _, answer = told(tmp_path, ElementTree.tostring(tree, "unicode"), "s0,r0")
     assert answer.condition is not None
     assert not answer.condition.never

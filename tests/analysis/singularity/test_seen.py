@@ -11,11 +11,11 @@ from hrsynth.analysis.aspects.path import path
 from hrsynth.analysis.derive import derive
 from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.analysis.singularity.condition_check import spectrum
+from hrsynth.analysis.singularity.condition_check import compute_spectrum
 from hrsynth.analysis.singularity.singularities import Singularity, singularities
 from hrsynth.constraints.vector_algebra import evaluate
 from hrsynth.geometry.vectors import Array
-from hrsynth.kinematics.locked_twists import interaction
+from hrsynth.kinematics.locked_twists import compute_interaction
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 
@@ -199,9 +199,9 @@ def test_the_screws_of_all_joints_give_pinocchios_singular_values(robot: str, se
     """Lengths are in characteristic lengths in both, whatever the robot's size."""
     setup = ObservedRobot.of(robot, camera="eye=base@0.3,0.1,0.2", sensor=sensor)
     observation_model, chunk = setup.samples.observation_model, setup.configurations[:5]
-    smallest, largest = spectrum(chunk, observation_model)
+    smallest, largest = compute_spectrum(chunk, observation_model)
     for at, low, high in zip(chunk, smallest, largest, strict=True):
-        found = np.linalg.svd(interaction(at, observation_model), compute_uv=False)
+        found = np.linalg.svd(compute_interaction(at, observation_model), compute_uv=False)
         assert found[-1] == pytest.approx(low, rel=1e-8)
         assert found[0] == pytest.approx(high, rel=1e-8)
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from hrsynth.geometry.vectors import Array, inverse, pose, rotation_from_rpy
+from hrsynth.geometry.vectors import Array, build_pose, convert_rpy_to_rotation, invert_pose
 
 A, B, C, D = (np.array(p) for p in ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (2.0, 0.0, 1.5), (2.2, 0.0, 0.0)))
 Y = np.array([0.0, 1.0, 0.0])
 TILTS = {"base": (0, 0, 0), "crank": (0.1, -0.2, 0.3), "bar": (0.3, 0.2, -0.4), "rocker": (-0.5, 0.1, 0.2)}
 ORIGINS = {"base": A, "crank": A, "bar": B, "rocker": D}
-X: dict[str, Array] = {name: pose(ORIGINS[name], rotation_from_rpy(*TILTS[name])) for name in TILTS}
+X: dict[str, Array] = {name: build_pose(ORIGINS[name], convert_rpy_to_rotation(*TILTS[name])) for name in TILTS}
 
 
 def words(values: object) -> str:
@@ -20,7 +20,7 @@ def words(values: object) -> str:
 
 def at(link: str, point: Array) -> str:
     """A point of the world in a link's frame."""
-    return words((inverse(X[link]) @ np.append(point, 1.0))[:3])
+    return words((invert_pose(X[link]) @ np.append(point, 1.0))[:3])
 
 
 def along(link: str, direction: Array = Y) -> str:
@@ -34,7 +34,7 @@ def rpy(R: Array) -> str:
 
 
 def _joint(name: str, parent: str, child: str, extra: str = "") -> str:
-    relative = inverse(X[parent]) @ X[child]
+    relative = invert_pose(X[parent]) @ X[child]
     return (
         f'<joint name="{name}" type="continuous"><parent link="{parent}"/><child link="{child}"/>'
         f'<origin xyz="{words(relative[:3, 3])}" rpy="{rpy(relative[:3, :3])}"/><axis xyz="{along(child)}"/>'
@@ -127,7 +127,7 @@ def quat(R: Array) -> str:
 
 
 def _body(name: str, parent: str, joint: str, inside: str = "") -> str:
-    relative = inverse(X[parent]) @ X[name]
+    relative = invert_pose(X[parent]) @ X[name]
     return (
         f'<body name="{name}" pos="{words(relative[:3, 3])}" quat="{quat(relative[:3, :3])}">'
         f'<joint name="{joint}" axis="{along(name)}"/>{inside}</body>'

@@ -23,7 +23,7 @@ from lxml import etree
 sys.path[:0] = [str(Path(__file__).resolve().parents[2])]  # run as a program, this folder alone is on the path
 
 from description.foreign.examples import EXTENDED, FILES  # noqa: E402
-from hrsynth.description import list_robots, load, native, save, spanning  # noqa: E402
+from hrsynth.description import build_spanning_mechanism, list_robots, load, native, save  # noqa: E402
 from hrsynth.errors import HrsynthError  # noqa: E402
 from hrsynth.mechanism import Mechanism  # noqa: E402
 
@@ -158,7 +158,7 @@ def check_valid(robot: Mechanism) -> None:
         for each in (*(link.pose for link in robot.links.values()), *(joint.point for joint in robot.joints.values()))
     )
     again = native.parse(native.write(robot))
-    assert again.differences(spanning(robot), 1e-6 + 1e-11 * scale) == []
+    assert again.differences(build_spanning_mechanism(robot), 1e-6 + 1e-11 * scale) == []
 
 
 def outcomes(count: int, seed: int) -> Iterator[tuple[str, dict[str, str], str]]:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hrsynth.description import save, spanning
-from hrsynth.geometry.vectors import pose
+from hrsynth.description import build_spanning_mechanism, save
+from hrsynth.geometry.vectors import build_pose
 from hrsynth.mechanism import JointType, Mechanism
 from hrsynth.mechanism.model import Joint, Link, Motor
 
@@ -36,21 +36,21 @@ def of_hinges(robot: Mechanism, aligned: bool = False, slid: float = 0.0, apart:
                 slid * rng.uniform(-1, 1) * axis + apart * number * np.cross(axes[0], axes[1])
             )
             if not last:
-                links[after] = Link(after, pose(point))
+                links[after] = Link(after, build_pose(point))
             name = f"{joint.name}_hinge{number}"
             motor = None if joint.motor is None else Motor(f"{joint.motor.name}_{number}")
             joints[name] = Joint(
                 name, JointType.REVOLUTE, before, after, point, (axis,), motor, in_tree=joint.in_tree or not last
             )
             before = after
-    return spanning(replace(robot, links=links, joints=joints))
+    return build_spanning_mechanism(replace(robot, links=links, joints=joints))
 
 
 def in_millimetres(robot: Mechanism) -> Mechanism:
     """The same robot, its lengths a thousand times as large."""
 
     def far(X: np.ndarray) -> np.ndarray:
-        return pose(1000 * X[:3, 3], X[:3, :3])
+        return build_pose(1000 * X[:3, 3], X[:3, :3])
 
     links = {name: replace(link, pose=far(link.pose)) for name, link in robot.links.items()}
     joints = {name: replace(joint, point=1000 * joint.point, limits=None) for name, joint in robot.joints.items()}

@@ -13,10 +13,10 @@ from hrsynth.analysis.pose_requests import observe
 from hrsynth.description import formats, load
 from hrsynth.description.assembly.candidates import ClosureCandidate, closure_candidates
 from hrsynth.description.jointgraph import JointGraph
-from hrsynth.description.reading import robot_file
+from hrsynth.description.reading import open_robot_file
 from hrsynth.errors import BadRequest
-from hrsynth.geometry.vectors import inverse, pose, rotation_from_rpy
-from hrsynth.mechanism.normal import normal_form
+from hrsynth.geometry.vectors import build_pose, convert_rpy_to_rotation, invert_pose
+from hrsynth.mechanism.normal import reduce_to_normal_form
 
 FRAMES = _frame("hook", "rocker", C) + _frame("eye", "bar", C)
 
@@ -24,7 +24,7 @@ FRAMES = _frame("hook", "rocker", C) + _frame("eye", "bar", C)
 def candidates(folder: Path, text: str, base: str = "base") -> tuple[ClosureCandidate, ...]:
     path = folder / "robot.urdf"
     path.write_text(text)
-    graph = formats.read(robot_file(path))
+    graph = formats.read(open_robot_file(path))
     assert isinstance(graph, JointGraph)
     return closure_candidates(graph, base)
 
@@ -39,9 +39,9 @@ def chain(rng: np.random.Generator, links: int) -> str:
             f'<child link="k{k + 1}"/><origin xyz="{words(shift)}" rpy="{words(angles)}"/>'
             f'<axis xyz="{words(axis)}"/></joint>'
         )
-        X = X @ pose(shift, rotation_from_rpy(*angles))
+        X = X @ build_pose(shift, convert_rpy_to_rotation(*angles))
     hook = rng.uniform(-1, 1, 3)
-    eye = (inverse(X) @ np.append(hook, 1))[:3]
+    eye = (invert_pose(X) @ np.append(hook, 1))[:3]
     for name, link, point in (("hook", "k0", hook), ("eye", f"k{links}", eye)):
         text += (
             f'<link name="{name}"/><joint name="{name}_fixed" type="fixed"><parent link="{link}"/>'
@@ -55,8 +55,8 @@ def test_frames_that_coincide_are_told_and_close_the_loop(tmp_path: Path):
     assert set(found.links) == {"hook", "eye"}
     assert found.coincides
     robot = load(tmp_path / "robot.urdf", close=found.wish, platform="bar")
-    assert mobility(normal_form(robot).mechanism) == 1
-    assert lines(normal_form(robot).mechanism) == sorted(tuple(point + 0.0) for point in (A, B, C, D))
+    assert mobility(reduce_to_normal_form(robot).mechanism) == 1
+    assert lines(reduce_to_normal_form(robot).mechanism) == sorted(tuple(point + 0.0) for point in (A, B, C, D))
 
 
 def test_a_robot_without_a_loop_is_told_to_have_none(tmp_path: Path):

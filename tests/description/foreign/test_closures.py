@@ -30,7 +30,7 @@ from hrsynth.description import load, save
 from hrsynth.errors import BadRequest, BadRobotFile
 from hrsynth.geometry.vectors import Array
 from hrsynth.mechanism import JointType, Mechanism
-from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.normal import reduce_to_normal_form
 from oracle import Oracle
 
 FOUR = sorted(tuple(point + 0.0) for point in (A, B, C, D))
@@ -57,7 +57,7 @@ def notes(robot: Mechanism, kind: str) -> list[str]:
 
 
 def is_the_four_bar(robot: Mechanism) -> bool:
-    normal = normal_form(robot).mechanism
+    normal = reduce_to_normal_form(robot).mechanism
     return lines(normal) == FOUR and mobility(normal) == 1
 
 
@@ -401,7 +401,7 @@ def test_a_base_in_another_component_is_looked_from(tmp_path: Path):
         read(tmp_path, text, platform="bar")
     robot = read(tmp_path, text, base="base", platform="bar")
     assert is_the_four_bar(robot)
-    assert mobility(normal_form(read(tmp_path, text, base="crank", platform="rocker")).mechanism) == 1
+    assert mobility(reduce_to_normal_form(read(tmp_path, text, base="crank", platform="rocker")).mechanism) == 1
 
 
 @pytest.mark.parametrize("name", ["urdf+", "constraint", "onshape"])
@@ -471,6 +471,6 @@ def test_what_was_read_is_written_and_read_back(tmp_path: Path):
         for ending in ("urdf", "xml", "sdf", "yaml"):
             save(robot, tmp_path / f"back{number}{ending}.{ending}")
             back = load(tmp_path / f"back{number}{ending}.{ending}")
-            assert np.allclose(lines(normal_form(back).mechanism), FOUR, atol=1e-9)
+            assert np.allclose(lines(reduce_to_normal_form(back).mechanism), FOUR, atol=1e-9)
             oracle = Oracle(back)
             assert oracle.mobility(oracle.zero()) == 1

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hrsynth.cli import execute
+from hrsynth.cli import run_command
 from hrsynth.description import load, save
-from hrsynth.description.contents import Content, content_of
+from hrsynth.description.contents import Content, collect_content
 from hrsynth.description.formats.usd import stage
-from hrsynth.description.meshes import locate_mesh, triangles
+from hrsynth.description.meshes import locate_mesh, read_robot_meshes
 from hrsynth.errors import BadRequest
-from hrsynth.geometry.vectors import rotation_from_rpy
+from hrsynth.geometry.vectors import convert_rpy_to_rotation
 from hrsynth.mechanism import Mechanism
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype="<f4")
@@ -107,7 +107,9 @@ def test_what_links_hold_survives_from_dialect_to_dialect(first: str, second: st
     back = load(tmp_path / "two" / f"robot{second}")
     assert sorted(path.name for path in (tmp_path / "two" / "meshes").iterdir()) == ["a.stl", "b.stl"]
     for name, link in robot.links.items():
-        same(content_of(link, robot), content_of(back.links[name], back), (tmp_path / "src", tmp_path / "two"))
+        same(
+            collect_content(link, robot), collect_content(back.links[name], back), (tmp_path / "src", tmp_path / "two")
+        )
 
 
 def test_mujoco_loads_masses_and_meshes_as_they_are(tmp_path: Path):
@@ -118,7 +120,7 @@ def test_mujoco_loads_masses_and_meshes_as_they_are(tmp_path: Path):
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "out" / "robot.xml"))
     assert model.nmesh == 2
     for name, link in robot.links.items():
-        body, inertial = model.body(name), content_of(link, robot).inertial
+        body, inertial = model.body(name), collect_content(link, robot).inertial
         assert body.mass[0] == pytest.approx(inertial.mass, rel=1e-12)
         assert body.ipos == pytest.approx(inertial.X[:3, 3], abs=1e-9)
         assert sorted(body.inertia) == pytest.approx(sorted(np.linalg.eigvalsh(inertial.inertia)), rel=1e-6)
@@ -156,11 +158,11 @@ def test_meshes_are_named_from_the_new_folder_and_never_overwritten(tmp_path: Pa
     filled(tmp_path)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "far" / "away").mkdir(parents=True)
-    assert execute(["convert", "src/robot.urdf", "-o", "far/away/robot.sdf"]) == 0
+    assert run_command(["convert", "src/robot.urdf", "-o", "far/away/robot.sdf"]) == 0
     assert "../../src/parts/b.stl" in (tmp_path / "far" / "away" / "robot.sdf").read_text()
     (tmp_path / "far" / "meshes").mkdir()
     (tmp_path / "far" / "meshes" / "b.stl").write_text("precious")
-    assert execute(["convert", "src/robot.urdf", "far/robot.sdf", "--meshes", "copy"]) == 2
+    assert run_command(["convert", "src/robot.urdf", "far/robot.sdf", "--meshes", "copy"]) == 2
     assert "other content" in capsys.readouterr().err
     assert sorted(path.name for path in (tmp_path / "far").rglob("*")) == ["away", "b.stl", "meshes", "robot.sdf"]
     assert (tmp_path / "far" / "meshes" / "b.stl").read_text() == "precious"
@@ -169,7 +171,7 @@ def test_meshes_are_named_from_the_new_folder_and_never_overwritten(tmp_path: Pa
         ["convert", "3rps", "a.xml", "-o", "b.xml"],
         ["convert", "3rps", "a.xml", "--meshes", "x"],
     ):
-        assert execute(asked) == 2
+        assert run_command(asked) == 2
 
 
 @pytest.mark.slow
@@ -198,10 +200,10 @@ def test_all_meshes_in_usd_files_are_read_by_one_process(tmp_path: Path, monkeyp
     )
     for file in "ab":
         (tmp_path / f"{file}.usda").write_text("#usda 1.0\n" + "\n".join(prim.format(f"p{k}") for k in range(20)))
-    runs, run = [], stage.output
-    monkeypatch.setattr(stage, "output", lambda *given, **rest: runs.append(given) or run(*given, **rest))
+    runs, run = [], stage.run_program
+    monkeypatch.setattr(stage, "run_program", lambda *given, **rest: runs.append(given) or run(*given, **rest))
     names = [f"{file}.usda#/p{k}" for file in "ab" for k in range(20)]
-    found = triangles(names, str(tmp_path / "robot.urdf"))
+    found = read_robot_meshes(names, str(tmp_path / "robot.urdf"))
     assert [found[name][0].shape for name in names] == [(3, 3)] * 40
     assert len(runs) == 1
 
@@ -217,7 +219,7 @@ def test_a_mesh_is_copied_once_however_it_is_spelt(tmp_path: Path, monkeypatch: 
     save(folder / "robot.urdf", tmp_path / "out.urdf", meshes="copy")
     copied = sorted(path.name for path in (tmp_path / "meshes").iterdir())
     assert [each for each in copied if each.startswith("b")] == ["b.stl"]
-    monkeypatch.setattr("hrsynth.description.meshes.MOST_MESHES", len(copied) - 1)
+    monkeypatch.setattr("hrsynth.description.meshes.MESH_FILES_MAX", len(copied) - 1)
     with pytest.raises(BadRequest, match=f"up to {len(copied) - 1}"):
         save(folder / "robot.urdf", tmp_path / "new" / "out.urdf", meshes="copy")
 
@@ -233,7 +235,7 @@ def test_shapes_of_foreign_mjcf(tmp_path: Path):
         '<geom type="ellipsoid" size="1 2 3"/></body></worldbody></mujoco>'
     )
     robot = load(tmp_path / "robot.xml")
-    found = content_of(robot.links["a"], robot)
+    found = collect_content(robot.links["a"], robot)
     assert [(s.kind, s.role, s.sizes, s.colour) for s in found.solids] == [
         ("box", "visual", (2, 4, 6), (1, 0, 0, 1)),
         ("box", "collision", (2, 4, 6), None),
@@ -243,7 +245,7 @@ def test_shapes_of_foreign_mjcf(tmp_path: Path):
     assert found.solids[2].X[:3, 3] == pytest.approx((1, 0, 0))
     assert np.abs(found.solids[2].X[:3, 2]) == pytest.approx((1, 0, 0))
     assert (found.solids[3].file, found.solids[3].scale) == ("m/x.stl", (2, 2, 2))
-    assert found.inertial.X[:3, :3] == pytest.approx(rotation_from_rpy(0, 0, 1))
+    assert found.inertial.X[:3, :3] == pytest.approx(convert_rpy_to_rotation(0, 0, 1))
 
 
 def test_a_half_written_robot_leaves_no_meshes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -266,7 +268,7 @@ def test_a_unit_is_that_of_shapes_too_and_inertias_stay_as_told(tmp_path: Path):
     small = load(tmp_path / "src" / "robot.urdf", unit="mm")
     assert any("inertias" in note.text for note in small.notes)
     for name, link in robot.links.items():
-        one, two = content_of(link, robot), content_of(small.links[name], small)
+        one, two = collect_content(link, robot), collect_content(small.links[name], small)
         assert two.inertial.mass == one.inertial.mass
         assert two.inertial.X[:3, 3] == pytest.approx(one.inertial.X[:3, 3] / 1000)
         assert np.array_equal(two.inertial.inertia, one.inertial.inertia)

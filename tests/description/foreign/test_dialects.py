@@ -10,7 +10,7 @@ import pytest
 from description.foreign.examples import FILES, A, B, C, D, Y
 from hrsynth.description import load
 from hrsynth.mechanism import JointType, Mechanism
-from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.normal import reduce_to_normal_form
 from oracle import Oracle
 
 
@@ -42,12 +42,12 @@ def lines(mechanism: Mechanism) -> list[tuple[float, ...]]:
 @pytest.mark.parametrize("name", FILES)
 def test_every_dialect_says_the_same_four_bar(name: str, tmp_path: Path):
     robot = load(written(tmp_path, FILES[name]))
-    normal = normal_form(robot).mechanism
+    normal = reduce_to_normal_form(robot).mechanism
     assert lines(normal) == sorted(tuple(point + 0.0) for point in (A, B, C, D))
     assert robot.platform in ("bar", "pin", "two")
     assert robot.base == "base"
     assert mobility(normal) == 1
-    motors = {joint.name for joint in robot.joints.values() if joint.actuated}
+    motors = {joint.name for joint in robot.joints.values() if joint.is_actuated}
     assert motors == (set() if name.startswith("sdf") else {"a"})
 
 

@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from description.foreign.examples import FILES, MJCF, SDF, URDF
-from hrsynth.budgets import MOST_DEFECTS
+from hrsynth.budgets import FILE_DEFECTS_MAX
 from hrsynth.description import load
-from hrsynth.description.xml import _comments as comments
+from hrsynth.description.xml import _find_comments as comments
 from hrsynth.errors import HrsynthError, MissingExtra
 
 SECONDS, BYTES = 5, 1_000_000_000
@@ -154,7 +154,7 @@ def test_a_million_links_are_refused_in_time_and_memory(name: str, tmp_path: Pat
     few = name == "just not too many"
     assert run.returncode == (0 if few else 2), run.stderr[-500:]
     assert (tmp_path / "out.sdf").exists() is few
-    lines = {"just not too many": 2, "defects": MOST_DEFECTS // 2 + 1}.get(name, 1)  # most are met twice
+    lines = {"just not too many": 2, "defects": FILE_DEFECTS_MAX // 2 + 1}.get(name, 1)  # most are met twice
     assert len(run.stderr.splitlines()) == lines  # that it is an open chain, and its platform
     (peak,) = re.findall(r"VmHWM:\s+(\d+) kB", told.read_text())
     assert 1_000_000 < int(peak) * 1024 < BYTES

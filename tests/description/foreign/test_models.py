@@ -94,7 +94,7 @@ def test_three_observed_legs_control_all_six_freedoms(name: str, architecture: s
     assert found.verdict.verdict == "controllable"
     assert found.dof == 6
     assert found.hidden is not None
-    assert sum(joint.type.freedoms for joint in found.hidden.joints.values() if joint.actuated) == 6
+    assert sum(joint.type.freedoms for joint in found.hidden.joints.values() if joint.is_actuated) == 6
 
 
 @pytest.mark.slow

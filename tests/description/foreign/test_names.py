@@ -14,7 +14,7 @@ from hrsynth.description import formats, load, save
 from hrsynth.description.chains import BODY, CUT, END, SECOND, TIP, WELD
 from hrsynth.errors import BadRequest
 from hrsynth.mechanism.legs import decompose
-from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.normal import reduce_to_normal_form
 
 ROBOT = "3upu"
 NAME = r"\w+_\d\w*"
@@ -27,8 +27,8 @@ ENDS = ("__1", "__2", "__3", CUT, WELD, END, SECOND, TIP, BODY)
 def texts(dialect: str) -> dict[str, str]:
     """The files of a robot with universal and spherical joints in its loops."""
     target = Path("robot").with_suffix(DIALECTS[dialect])
-    chosen = formats.dialects()[dialect]
-    found = formats.writer(dialect)(load(ROBOT)).texts
+    chosen = formats.list_formats()[dialect]
+    found = formats.get_writer(dialect)(load(ROBOT)).texts
     return {file.name: text for file, text in zip(chosen.files(target), found, strict=True)}
 
 
@@ -37,8 +37,8 @@ def answer(texts: dict[str, str], folder: Path, first: str) -> object:
     for name, text in texts.items():
         (folder / name).write_text(text)
     robot = load(folder / first)
-    decomposition = decompose(normal_form(robot).mechanism)
-    return str(decomposition.architecture()), sum(joint.actuated for joint in robot.joints.values())
+    decomposition = decompose(reduce_to_normal_form(robot).mechanism)
+    return str(decomposition.architecture()), sum(joint.is_actuated for joint in robot.joints.values())
 
 
 def renamed(texts: dict[str, str], old: str, new: str) -> dict[str, str]:

@@ -16,9 +16,9 @@ import hrsynth
 from hrsynth.analysis.derive import derive
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load
-from hrsynth.errors import BadRobotFile, LoopsNotClosed
+from hrsynth.errors import BadRobotFile, LoopClosureFailure
 from hrsynth.geometry.vectors import Array
-from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.normal import reduce_to_normal_form
 from oracle import Oracle
 
 OTHERS = Path(os.environ.get("HRSYNTH_OTHERS", "none"))
@@ -66,9 +66,9 @@ SPHERICAL = (
 )
 REFUSED: dict[str, tuple[dict[str, str], type[Exception], str]] = {
     f"{GEPETTO}/disney_robot/robot.urdf": ({}, BadRobotFile, "joint_name 'left_spherical_free_foot'"),
-    f"{GEPETTO}/kangaroo_like/robot.urdf": ({"platform": "foot"}, LoopsNotClosed, "is open at"),
-    f"{GEPETTO}/kangaroo_like_2legs/robot.urdf": ({"platform": "foot_left"}, LoopsNotClosed, "is open at"),
-    f"{GEPETTO}/kangaroo_like_2leg/robot.urdf": ({"platform": "foot"}, LoopsNotClosed, "is open at"),
+    f"{GEPETTO}/kangaroo_like/robot.urdf": ({"platform": "foot"}, LoopClosureFailure, "is open at"),
+    f"{GEPETTO}/kangaroo_like_2legs/robot.urdf": ({"platform": "foot_left"}, LoopClosureFailure, "is open at"),
+    f"{GEPETTO}/kangaroo_like_2leg/robot.urdf": ({"platform": "foot"}, LoopClosureFailure, "is open at"),
 }
 
 
@@ -84,7 +84,7 @@ def test_mobility_and_verdict_are_those_of_independent_counts(name: str):
     robot = load(path_of(name), **given)
     setup = ObservedRobot.of(robot, samples=4)
     assert setup.mobility_as_written.total == mobility
-    whole, normal = Oracle(robot), Oracle(normal_form(robot).mechanism)
+    whole, normal = Oracle(robot), Oracle(reduce_to_normal_form(robot).mechanism)
     assert whole.mobility(whole.zero()) == mobility
     relation = normal.relation(normal.zero(), setup.observed)
     assert setup.dof == dof == _rank(relation[:6])

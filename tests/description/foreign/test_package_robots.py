@@ -10,7 +10,7 @@ import pytest
 from hrsynth.analysis.check import check
 from hrsynth.description import formats, load
 from hrsynth.description.jointgraph import JointGraph
-from hrsynth.description.reading import robot_file
+from hrsynth.description.reading import open_robot_file
 from hrsynth.errors import BadRequest, BadRobotFile
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
@@ -35,7 +35,7 @@ EMPTY = "ur3.urdf"  # macros alone, no links
 
 
 def read(path: Path) -> JointGraph:
-    found = formats.read(robot_file(path))
+    found = formats.read(open_robot_file(path))
     assert isinstance(found, JointGraph)
     return found
 
@@ -126,4 +126,4 @@ def test_a_leg_is_checked_between_pelvis_and_foot():
     for side in ("left", "right"):
         found = check(load(path, base="pelvis", platform=f"{side}-foot"))
         assert found.postures[0].dof == 5
-        assert found.postures[0].decided
+        assert found.postures[0].has_decided_ranks

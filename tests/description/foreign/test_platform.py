@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import hrsynth
-from hrsynth.cli import execute
+from hrsynth.cli import run_command
 from hrsynth.description import load
 from hrsynth.errors import AssumedBase, AssumedPlatform, BadRequest
 from hrsynth.mechanism import Mechanism
@@ -175,16 +175,16 @@ def test_every_answer_names_the_platform_and_what_chose_it(
     robot = [str(bar), *(given or ())]
     if given is None:
         robot = [str(tmp_path / "own.urdf")]
-        assert execute(["convert", str(bar), robot[0]]) == 0
+        assert run_command(["convert", str(bar), robot[0]]) == 0
     for command in (["check"], ["legs"], ["convert", "-o", str(tmp_path / "other.urdf")]):
         capsys.readouterr()
-        assert execute([command[0], *robot, *command[1:], "--json"]) == 0
+        assert run_command([command[0], *robot, *command[1:], "--json"]) == 0
         out, err = capsys.readouterr()
         said = json.loads(out)["platform"]
         assert (said["link"], said["chosen"]) == ("bar", chosen)
         assert ("assumption: the platform is link 'bar'" in err) is (chosen == "assumption")
         assert "Warning" not in err
-        assert execute([command[0], *robot, *command[1:]]) == 0
+        assert run_command([command[0], *robot, *command[1:]]) == 0
         words = ("assumed: " if chosen == "assumption" else "") + said["reason"]
         assert f"bar ({words})" in capsys.readouterr().out
 

@@ -16,12 +16,12 @@ from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import list_robots, load, save
 from hrsynth.description.assembly.geometry_repair import nearest, snap_geometry
 from hrsynth.description.numerals import Digits
-from hrsynth.errors import BadRequest, LoopsNotClosed, StructureUndecided
-from hrsynth.geometry.vectors import pose, rotation_about, unit
+from hrsynth.errors import BadRequest, LoopClosureFailure, UndecidedStructure
+from hrsynth.geometry.vectors import build_pose, normalise_vector, rotate_about_axis
 from hrsynth.mechanism import JointType, Mechanism
-from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.normal import reduce_to_normal_form
 from hrsynth.mechanism.observations.direction import Direction
-from hrsynth.tolerances import NOISE
+from hrsynth.tolerances import INCIDENCE_TOL
 from strategies import transformed
 
 SOME = ("3rps", "delta", "3upu", "3rrr_m1", "prrrp_m1")
@@ -71,7 +71,7 @@ def test_every_rounded_robot_is_the_same_or_refused(name: str, tmp_path: Path):
         folder.mkdir()
         try:
             assert answer(again(robot, folder / f"robot{ending}", decimals)) == meant, folder.name
-        except StructureUndecided:
+        except UndecidedStructure:
             undecided.append(variant)
     assert len(undecided) <= 1
     assert all(variant.startswith("connectors") for variant in undecided)
@@ -107,7 +107,7 @@ def test_the_whole_table(decimals: int, significant: bool, tmp_path: Path):
             count += 1
             try:
                 found = again(robot, folder / f"robot{ending}", decimals, significant)
-            except StructureUndecided:
+            except UndecidedStructure:
                 refused += 1
                 continue
             assert answer(found) == meant, folder.name
@@ -129,7 +129,7 @@ def test_axes_that_miss_each_other_by_far_make_no_ball(name: str, tmp_path: Path
 @pytest.mark.parametrize("name", list_robots())
 def test_what_is_not_rounded_stays_as_it_is(name: str):
     robot = load(name)
-    assert snap_geometry(robot, 0.0, NOISE) is robot
+    assert snap_geometry(robot, 0.0, INCIDENCE_TOL) is robot
 
 
 @pytest.mark.some(2)
@@ -137,7 +137,7 @@ def test_what_is_not_rounded_stays_as_it_is(name: str):
 @pytest.mark.parametrize("name", ["linear_delta", "3ppr_m2"])
 def test_a_tilted_robot_of_no_round_numbers_is_the_same(name: str, decimals: int, tmp_path: Path):
     """No axis along a base axis, no length of few digits: nothing is found by its numbers."""
-    robot, X = load(name), pose((0.123, -0.377, 0.219), rotation_about(unit([1.0, 2.0, 0.5]), 0.7))
+    robot, X = load(name), build_pose((0.123, -0.377, 0.219), rotate_about_axis(normalise_vector([1.0, 2.0, 0.5]), 0.7))
     moved = {
         name: replace(link, pose=link.pose if name == robot.base else X @ link.pose)
         for name, link in robot.links.items()
@@ -160,13 +160,13 @@ def test_rounded_directions_of_observe_are_those_of_segments(tmp_path: Path):
     path = exported(of_hinges(replace(robot, observations=tuple(seen))), tmp_path / "robot.urdf", 5)
     found = load(path)
     assert [note.text for note in found.notes if note.text.endswith("watched directions of leg 1, of leg 2, of leg 3")]
-    balls = normal_form(found).mechanism
+    balls = reduce_to_normal_form(found).mechanism
     for one, two in zip(found.observations, seen, strict=True):
         assert isinstance(one, Direction)
         assert isinstance(two, Direction)
         assert 1e-11 < np.linalg.norm(one.direction - two.direction) < 1e-4
         ends = [joint.point for joint in balls.joints_of(one.link)]
-        rod = found.links[one.link].pose[:3, :3].T @ unit(ends[1] - ends[0])
+        rod = found.links[one.link].pose[:3, :3].T @ normalise_vector(ends[1] - ends[0])
         assert abs(one.direction @ rod) == pytest.approx(1.0, abs=1e-15)
     assert {each.rule for each in hrsynth.lint(path, fix=True).fixed} == {"geometry-rounded"}
     assert not load(path).notes
@@ -185,12 +185,15 @@ def test_rounded_observe_elements_hide_the_same_robot(name: str, tmp_path: Path)
 
 def test_watched_directions_are_square_to_axes_or_as_they_are(tmp_path: Path):
     """No segment: in the plane where that is meant, else untouched."""
-    robot, X = load("3rrr_m1"), pose((0.1, 0.2, 0.3), rotation_about(unit([1.0, 2.0, 0.5]), 0.7))
+    robot, X = load("3rrr_m1"), build_pose((0.1, 0.2, 0.3), rotate_about_axis(normalise_vector([1.0, 2.0, 0.5]), 0.7))
     moved = transformed(robot, X[:3, :3], X[:3, 3])
     link = moved.links[robot.platform].pose[:3, :3]
     normal = link.T @ next(iter(moved.joints.values())).axis
-    flat = unit(np.cross(normal, [0.3, 0.5, 0.1]))
-    seen = [Direction("1", robot.platform, flat), Direction("2", robot.platform, unit(flat + 0.01 * normal))]
+    flat = normalise_vector(np.cross(normal, [0.3, 0.5, 0.1]))
+    seen = [
+        Direction("1", robot.platform, flat),
+        Direction("2", robot.platform, normalise_vector(flat + 0.01 * normal)),
+    ]
     found = load(exported(replace(moved, observations=tuple(seen)), tmp_path / "robot.urdf", 5))
     axis = next(iter(found.joints.values())).axis
     R = found.links[robot.platform].pose[:3, :3]
@@ -201,14 +204,14 @@ def test_watched_directions_are_square_to_axes_or_as_they_are(tmp_path: Path):
 
 def test_what_was_made_exact_is_exact_and_told(tmp_path: Path):
     robot = again(of_hinges(load("delta")), tmp_path / "robot.xml", 4)
-    balls = [j for j in normal_form(robot).mechanism.joints.values() if j.type is JointType.SPHERICAL]
+    balls = [j for j in reduce_to_normal_form(robot).mechanism.joints.values() if j.type is JointType.SPHERICAL]
     assert len(balls) == 12
     (told,) = [note.text for note in robot.notes if "are made exact" in note.text]
     shift = float(told.split("moved by up to ")[1].split(" mm")[0])
     assert 0 < shift < 0.5
     kinds = [note.text.removeprefix("made to be ").split(":")[0] for note in robot.notes if "made to be" in note.text]
     assert {"perpendicular", "in line with an axis"} <= set(kinds)
-    exact = nearest(robot, NOISE)
+    exact = nearest(robot, INCIDENCE_TOL)
     assert exact is not None
     assert exact.mended == ()
 
@@ -234,11 +237,11 @@ def test_two_structures_equally_near_are_refused_with_advice(tmp_path: Path):
     other = next(j for j in robot.joints.values() if j.name == name.replace("hinge1", "hinge0"))
     shifted = joint.point + 3.5e-4 * np.cross(joint.axis, other.axis)
     path = exported(robot.changed(joints=[replace(joint, point=shifted)]), tmp_path / "robot.xml", 4)
-    with pytest.raises(StructureUndecided, match=r"--tolerance, or --as-written") as caught:
+    with pytest.raises(UndecidedStructure, match=r"--tolerance, or --as-written") as caught:
         load(path, platform=robot.platform)
     assert caught.value.exit_status == 3
     assert "6 U" in str(caught.value)
-    coarse = normal_form(load(path, platform=robot.platform, tolerance=5e-3)).mechanism
+    coarse = reduce_to_normal_form(load(path, platform=robot.platform, tolerance=5e-3)).mechanism
     assert sum(j.type is JointType.UNIVERSAL for j in coarse.joints.values()) == 6
 
 
@@ -247,7 +250,7 @@ def test_as_written_nothing_is_made_exact(tmp_path: Path):
     robot = load(path, platform="platform", as_written=True)
     assert not any("made exact" in note.text for note in robot.notes)
     path = exported(load("delta"), tmp_path / "robot.urdf", 5)
-    with pytest.raises(LoopsNotClosed, match=r"rounded: --tolerance 0\.0"):
+    with pytest.raises(LoopClosureFailure, match=r"rounded: --tolerance 0\.0"):
         load(path, as_written=True)
     assert answer(load(path)) == answer(load("delta"))
 

@@ -12,7 +12,7 @@ import hrsynth
 from description.foreign.rounded import exported
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load
-from hrsynth.errors import LoopsNotClosed
+from hrsynth.errors import LoopClosureFailure
 from hrsynth.mechanism import Mechanism
 from strategies import deltas, planar, pods
 
@@ -75,7 +75,7 @@ def test_where_only_the_lengths_are_rounded(word: str, tmp_path: Path):
     for each in sorted({each.split('"')[0] for each in text.split('xyz="')[1:]}, key=len, reverse=True):
         text = text.replace(f'"{each}"', '"' + " ".join(f"{float(x):.6g}" for x in each.split()) + '"')
     path.write_text(text)
-    with pytest.raises(LoopsNotClosed, match="--tolerance"):
+    with pytest.raises(LoopClosureFailure, match="--tolerance"):
         load(path, as_written=True)
     found = load(path)
     assert answer(found) == answer(robot(word))

@@ -14,14 +14,14 @@ from description.foreign.test_dialects import lines, mobility, written
 from description.foreign.test_traps import full_mobility
 from hrsynth.description import load, save
 from hrsynth.errors import BadRobotFile
-from hrsynth.geometry.vectors import rotation_from_rpy
+from hrsynth.geometry.vectors import convert_rpy_to_rotation
 from hrsynth.mechanism import Joint, JointType, Link, Mechanism, Motor
 from hrsynth.mechanism.legs import decompose
-from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.normal import reduce_to_normal_form
 
 
 def moving(robot: Mechanism) -> list[str]:
-    return sorted(str(joint.type) for joint in normal_form(robot).mechanism.joints.values())
+    return sorted(str(joint.type) for joint in reduce_to_normal_form(robot).mechanism.joints.values())
 
 
 def refused(path: Path) -> str:
@@ -39,12 +39,12 @@ def test_any_source_comes_back_the_same_from_any_dialect(name: str, ending: str,
     save(robot, tmp_path / f"out{ending}")
     for given in ({}, {"platform": "bar"}):
         back = load(tmp_path / f"out{ending}", **given)
-        assert lines(normal_form(back).mechanism) == lines(normal_form(robot).mechanism)
+        assert lines(reduce_to_normal_form(back).mechanism) == lines(reduce_to_normal_form(robot).mechanism)
         assert moving(back) == moving(robot)
         assert mobility(back) == mobility(robot)
         assert back.platform == robot.platform
-        assert {j.name for j in back.joints.values() if j.actuated} == {
-            j.name for j in robot.joints.values() if j.actuated
+        assert {j.name for j in back.joints.values() if j.is_actuated} == {
+            j.name for j in robot.joints.values() if j.is_actuated
         }
         assert np.allclose(back.links["bar"].pose, robot.links["bar"].pose, atol=1e-12)
 
@@ -79,7 +79,7 @@ def test_what_is_no_type_of_a_closure_is_refused(types: str, tmp_path: Path):
     assert "type: " in refused(written(tmp_path, files))
 
 
-TILT = rotation_from_rpy(0.3, -0.4, 0.5)
+TILT = convert_rpy_to_rotation(0.3, -0.4, 0.5)
 SPACE = [["P", "P", "P", "S"], ["P", "P", "P", "R", "R", "R"], ["S", "P", "P", "P"]]
 
 
@@ -120,7 +120,7 @@ def foreign(robot: Mechanism, path: Path) -> Path:
 
 
 def words(robot: Mechanism) -> list[str]:
-    normal = normal_form(robot).mechanism
+    normal = reduce_to_normal_form(robot).mechanism
     return sorted(
         "".join(sorted(str(normal.joints[name].type) for name in leg.joints)) for leg in decompose(normal).legs
     )

@@ -12,11 +12,18 @@ from description.foreign.examples import FILES, MJCF, TREE, A, B, C, D, at, ends
 from description.foreign.test_dialects import lines, mobility
 from hrsynth.analysis.pose_requests import observe
 from hrsynth.description import load
-from hrsynth.errors import BadMechanism, BadRequest, HrsynthError, LoopsNotClosed, RankBelowRounding, RankUndecided
+from hrsynth.errors import (
+    BadMechanism,
+    BadRequest,
+    HrsynthError,
+    LoopClosureFailure,
+    RoundingLimitedRank,
+    UndecidedRank,
+)
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism import JointType, Mechanism
-from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.normal import reduce_to_normal_form
 from hrsynth.mechanism.observations.direction import Direction
 
 CHAIN = '<link name="{1}"/><joint name="{0}" type="{3}"><parent link="{2}"/><child link="{1}"/>{4}</joint>'
@@ -88,7 +95,7 @@ def test_an_open_zero_pose_is_solved_with_its_joints_told(tmp_path: Path):
             f'<loop name="d" type="spherical">{ends("predecessor", "rocker")}{ends("successor", "bar")}</loop>'
         ).replace(TREE, moved),
     )
-    assert mobility(normal_form(robot).mechanism) == 1
+    assert mobility(reduce_to_normal_form(robot).mechanism) == 1
     (told,) = [note.text for note in robot.notes if note.kind == "solved"]
     assert "b = " in told
     assert "a = " not in told, "the motor stays"
@@ -96,7 +103,7 @@ def test_an_open_zero_pose_is_solved_with_its_joints_told(tmp_path: Path):
 
 def test_what_cannot_be_closed_is_refused(tmp_path: Path):
     far = bars([("p", "one", "base", origin(0)), ("q", "two", "base", origin(9))], revolute("one", 1.0, "two", 1.0))
-    with pytest.raises(LoopsNotClosed, match=r"'close' is open at.*--keyframe NAME"):
+    with pytest.raises(LoopClosureFailure, match=r"'close' is open at.*--keyframe NAME"):
         read(tmp_path, far, platform="two")
 
 
@@ -124,7 +131,7 @@ def test_an_overconstrained_loop_with_rounded_numbers_is_read_as_it_is_meant(siz
 @pytest.mark.some(1)
 @pytest.mark.parametrize("size", [3e-4, 1e-2])
 def test_more_than_rounding_is_refused(size: float, tmp_path: Path):
-    with pytest.raises((LoopsNotClosed, RankUndecided)) as caught:
+    with pytest.raises((LoopClosureFailure, UndecidedRank)) as caught:
         read(tmp_path, noisy(size))
     assert caught.value.exit_status == 3
 
@@ -161,7 +168,7 @@ def test_a_mimic_is_a_gear_and_no_motor(tmp_path: Path):
     assert full_mobility(free) == 3
     assert full_mobility(robot) == 2
     assert [(c.predecessor, c.successor, c.ratio) for c in robot.couplings] == [("one", "two", -2.0)]
-    assert not any(joint.actuated for joint in robot.joints.values())
+    assert not any(joint.is_actuated for joint in robot.joints.values())
     x = robot.links["tip"].pose[:3, 0]
     q = [np.arctan2(robot.links[n].pose[1, 0], robot.links[n].pose[0, 0]) for n in ("one", "two")]
     assert q[1] - q[0] == pytest.approx(-2 * q[0] + 0.5)
@@ -292,21 +299,21 @@ def test_frames_that_do_not_coincide_are_brought_together(tmp_path: Path):
 def test_efforts_of_zero_tell_the_motors_and_others_tell_nothing(tmp_path: Path):
     text = FILES["sdf: 1.7"]["robot.sdf"]
     efforts = text.replace("</xyz></axis>", "</xyz><limit><effort>5</effort></limit></axis>", 1)
-    assert not any(joint.actuated for joint in read(tmp_path, efforts, "sdf").joints.values())
+    assert not any(joint.is_actuated for joint in read(tmp_path, efforts, "sdf").joints.values())
     mixed = efforts.replace("</xyz></axis>", "</xyz><limit><effort>0</effort></limit></axis>")
     robot = read(tmp_path, mixed, "sdf")
-    assert {name for name, joint in robot.joints.items() if joint.actuated} == {"a"}
+    assert {name for name, joint in robot.joints.items() if joint.is_actuated} == {"a"}
     assert any(note.kind == "assumption" and "motors" in note.text for note in robot.notes)
 
 
 @pytest.mark.parametrize("R", ["xyz", "XYZ", "zyx"])
 def test_euler_angles_follow_their_sequence(R: str, tmp_path: Path):
-    from hrsynth.geometry.vectors import rotation_about
+    from hrsynth.geometry.vectors import rotate_about_axis
 
     angles = np.radians([30, 40, 50])
     expected = np.eye(3)
     for letter, angle in zip(R, angles, strict=True):
-        turn = rotation_about(np.eye(3)["xyz".index(letter.lower())], angle)
+        turn = rotate_about_axis(np.eye(3)["xyz".index(letter.lower())], angle)
         expected = expected @ turn if letter.islower() else turn @ expected
     head = f'<compiler eulerseq="{R}"/>'
     body = '<worldbody><body name="b" euler="{}"><joint/></body></worldbody></mujoco>'
@@ -411,13 +418,13 @@ def test_a_closure_may_be_given(wish: str, kind: str | None, tmp_path: Path):
         return
     robot = read(tmp_path, text, platform="bar", close=[wish])
     assert mobility(robot) == 1
-    assert lines(normal_form(robot).mechanism) == sorted(tuple(p + 0.0) for p in (A, B, C, D))
+    assert lines(reduce_to_normal_form(robot).mechanism) == sorted(tuple(p + 0.0) for p in (A, B, C, D))
 
 
 def test_motors_platform_freeze_and_observed_links_may_be_given(tmp_path: Path):
     text = FILES["urdf: urdf+"]["robot.urdf"]
     robot = read(tmp_path, text, platform="bar", motors="c", observe=["crank"])
-    assert {name for name, joint in robot.joints.items() if joint.actuated} == {"c"}
+    assert {name for name, joint in robot.joints.items() if joint.is_actuated} == {"c"}
     (seen,) = robot.observations
     assert isinstance(seen, Direction)
     assert seen.link == "crank"
@@ -450,7 +457,7 @@ def test_a_tool_on_a_fixed_joint_may_be_the_platform(tmp_path: Path):
     named = FOUR_BAR.replace('<platform link="bar"/>', '<platform link="tool"/>').replace(
         "<transmission", tool + "<transmission", 1
     )
-    assert normal_form(native.parse(named)).mechanism.platform == "tool"
+    assert reduce_to_normal_form(native.parse(named)).mechanism.platform == "tool"
     assert check(native.parse(named)).postures[0].dof == 1
     text = FILES["urdf: urdf+"]["robot.urdf"].replace("</robot>", _frame("tool", "bar", B) + "</robot>")
     foreign = read(tmp_path, text)
@@ -497,7 +504,7 @@ def test_loops_that_rounding_may_hold_are_refused_as_such(tmp_path: Path):
     main(str(tmp_path), "line_symmetric_bricard")
     whole = (tmp_path / "line_symmetric_bricard.urdf").read_text()
     text = re.sub(r"-?\d+\.\d+(e-?\d+)?", lambda number: f"{float(number[0]):.5f}", whole)
-    with pytest.raises(RankBelowRounding, match="1 of their constraints holds by no more than that") as caught:
+    with pytest.raises(RoundingLimitedRank, match="1 of their constraints holds by no more than that") as caught:
         read(tmp_path, text)
     assert "gap" not in str(caught.value)
     assert caught.value.directions == 1

@@ -14,9 +14,9 @@ from description.foreign.test_traps import full_mobility
 from description.foreign.test_writers import KINDS, bare
 from description.samples import every_joint
 from hrsynth import derive
-from hrsynth.cli import execute
-from hrsynth.description import list_robots, load, save, spanning
-from hrsynth.description.contents import content_of
+from hrsynth.cli import run_command
+from hrsynth.description import build_spanning_mechanism, list_robots, load, save
+from hrsynth.description.contents import collect_content
 from hrsynth.errors import BadRobotFile, MissingExtra
 from hrsynth.mechanism import JointType
 
@@ -135,7 +135,7 @@ def test_a_shipped_robot_comes_back_the_same(name: str, ending: str, tmp_path: P
     robot = load(name)
     assert save(robot, tmp_path / f"robot{ending}") == ()
     back = load(tmp_path / f"robot{ending}")
-    assert back.differences(spanning(robot)) == []
+    assert back.differences(build_spanning_mechanism(robot)) == []
     assert back.name == robot.name
     assert back.notes == ()
 
@@ -155,7 +155,7 @@ def test_its_hidden_robot_is_the_same(name: str, tmp_path: Path):
 
 @pytest.mark.parametrize("seed", [pytest.param(0, marks=pytest.mark.slow), 2])
 def test_joints_of_every_type_come_back(seed: int, tmp_path: Path):
-    robot = spanning(every_joint([*KINDS, *KINDS], KINDS, seed))
+    robot = build_spanning_mechanism(every_joint([*KINDS, *KINDS], KINDS, seed))
     save(robot, tmp_path / "robot.usda")
     assert bare(load(tmp_path / "robot.usda")).differences(bare(robot)) == []
 
@@ -238,7 +238,7 @@ def test_units_the_up_axis_and_degrees(tmp_path: Path):
         assert np.linalg.norm(each.joints["c"].point - each.joints["a"].point) == pytest.approx(2, abs=1e-6)
         limits = each.joints["a"].limits
         assert (limits.lower, limits.upper) == pytest.approx((-np.pi / 3, np.pi / 2), abs=1e-6)
-        assert [name for name, joint in each.joints.items() if joint.actuated] == ["a"]
+        assert [name for name, joint in each.joints.items() if joint.is_actuated] == ["a"]
         assert not each.joints["d"].in_tree
         assert full_mobility(each) == 1
 
@@ -337,7 +337,7 @@ def test_a_d6_is_the_joint_that_its_locks_leave(free: tuple[str, ...], kinds: st
 
 def test_drives_without_gains_and_doubles_that_were_overtaken(tmp_path: Path):
     robot = read(tmp_path, four_bar(crank="float drive:angular:physics:damping = 0"), platform="bar")
-    assert robot.joints["a"].actuated
+    assert robot.joints["a"].is_actuated
     save(robot, tmp_path / "out.usda")
     text = (tmp_path / "out.usda").read_text()
     assert "point3f physics:localPos0 = (2, 0, 0)" in text
@@ -386,7 +386,7 @@ def test_what_is_refused(text: str, said: str, tmp_path: Path):
 
 def test_a_refusal_is_one_line(tmp_path: Path, capsys):
     (tmp_path / "robot.usda").write_text("#usda 1.0\ndef Xform {")
-    assert execute(["check", str(tmp_path / "robot.usda")]) == 2
+    assert run_command(["check", str(tmp_path / "robot.usda")]) == 2
     assert capsys.readouterr().err.count("\n") == 1
 
 
@@ -417,7 +417,7 @@ def test_joints_and_bodies_of_one_name_keep_their_motors(tmp_path: Path):
     text = four_bar().replace('def PhysicsRevoluteJoint "a" (', inner)
     text = text.replace(DRIVEN + "\n}", DRIVEN + "\n}\n}")
     robot = read(tmp_path, text, platform="bar")
-    (motor,) = [name for name, joint in robot.joints.items() if joint.actuated]
+    (motor,) = [name for name, joint in robot.joints.items() if joint.is_actuated]
     assert set(robot.joints[motor].links) == {"ground", "crank"}
     arm = stage(
         body("ground")
@@ -432,7 +432,7 @@ def test_joints_and_bodies_of_one_name_keep_their_motors(tmp_path: Path):
     )
     robot = read(tmp_path, arm)
     assert [(c.predecessor, c.successor, c.ratio) for c in robot.couplings] == [("crank", "tool", 2.0)]
-    assert [robot.joints[name].successor for name in robot.joints if robot.joints[name].actuated] == ["crank"]
+    assert [robot.joints[name].successor for name in robot.joints if robot.joints[name].is_actuated] == ["crank"]
 
 
 def test_a_missing_package_is_told_with_what_installs_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys):
@@ -442,9 +442,9 @@ def test_a_missing_package_is_told_with_what_installs_it(tmp_path: Path, monkeyp
     monkeypatch.setattr(importlib.util, "find_spec", lambda name, *a: None if name == "pxr" else found(name, *a))
     with pytest.raises(MissingExtra, match=r'pip install "hrsynth\[usd\]"'):
         load(path)
-    assert execute(["check", str(path)]) == 3
+    assert run_command(["check", str(path)]) == 3
     assert capsys.readouterr().err.count("\n") == 1
-    assert execute(["convert", "3rps", str(tmp_path / "out.usdc")]) == 3
+    assert run_command(["convert", "3rps", str(tmp_path / "out.usdc")]) == 3
     error = capsys.readouterr().err
     assert error.count("\n") == 1
     assert str(tmp_path / "out.usdc") in error
@@ -452,7 +452,7 @@ def test_a_missing_package_is_told_with_what_installs_it(tmp_path: Path, monkeyp
 
 def test_no_room_for_temporary_files_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
-    assert execute(["convert", "3rps", "-o", str(tmp_path / "out.usdc")]) == 2
+    assert run_command(["convert", "3rps", "-o", str(tmp_path / "out.usdc")]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1
     assert "cannot write a temporary file" in error
@@ -474,7 +474,7 @@ def test_masses_shapes_and_colours_come_back(tmp_path: Path):
     full = replace(robot, links=links)
     assert save(full, tmp_path / "robot.usda") == ()
     back = load(tmp_path / "robot.usda")
-    one, two = content_of(full.links[full.platform], full), content_of(back.links[back.platform], back)
+    one, two = collect_content(full.links[full.platform], full), collect_content(back.links[back.platform], back)
     assert two.inertial.mass == 0.1
     R, S = one.inertial.X[:3, :3], two.inertial.X[:3, :3]
     assert S @ two.inertial.inertia @ S.T == pytest.approx(R @ one.inertial.inertia @ R.T, abs=1e-12)
@@ -496,7 +496,7 @@ def test_the_colour_of_a_mesh_that_is_missing_comes_back(tmp_path: Path):
     full = replace(robot, links={**robot.links, robot.platform: replace(robot.links[robot.platform], xml=shape)})
     assert "gone.stl" in str(save(full, tmp_path / "robot.usda"))
     back = load(tmp_path / "robot.usda")
-    (solid,) = content_of(back.links[back.platform], back).solids
+    (solid,) = collect_content(back.links[back.platform], back).solids
     assert solid.file is not None
     assert solid.file.endswith("gone.stl")
     assert solid.colour == pytest.approx((1, 0.5, 0, 0.25), abs=1e-6)

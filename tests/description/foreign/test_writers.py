@@ -11,7 +11,7 @@ from lxml import etree
 
 from description.foreign.test_traps import bars, full_mobility, origin, read
 from description.samples import FOUR_BAR, every_joint
-from hrsynth.description import list_robots, load, save, spanning
+from hrsynth.description import build_spanning_mechanism, list_robots, load, save
 from hrsynth.description.formats.mjcf.write import write
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.ranks import rank_of
@@ -37,7 +37,7 @@ def test_a_shipped_robot_comes_back_the_same(name: str, ending: str, tmp_path: P
     robot = load(name)
     lost = save(robot, tmp_path / f"robot{ending}")
     back = load(tmp_path / f"robot{ending}")
-    assert back.differences(spanning(robot)) == []
+    assert back.differences(build_spanning_mechanism(robot)) == []
     assert back.name == robot.name
     assert back.notes == ()
     assert lost == ()
@@ -47,7 +47,7 @@ def test_a_shipped_robot_comes_back_the_same(name: str, ending: str, tmp_path: P
 @pytest.mark.parametrize("ending", ENDINGS)
 @pytest.mark.parametrize("seed", [0, 2])
 def test_joints_of_every_type_come_back(seed: int, ending: str, tmp_path: Path):
-    robot = spanning(every_joint([*KINDS, *KINDS], KINDS, seed))
+    robot = build_spanning_mechanism(every_joint([*KINDS, *KINDS], KINDS, seed))
     lost = save(robot, tmp_path / f"robot{ending}")
     back = load(tmp_path / f"robot{ending}")
     fixed = {name for name, joint in robot.joints.items() if joint.type is JointType.FIXED and joint.in_tree}
@@ -87,7 +87,7 @@ def test_a_joint_keeps_the_name_that_a_link_has_too(ending: str, tmp_path: Path)
     save(robot, tmp_path / f"out{ending}")
     back = load(tmp_path / f"out{ending}")
     assert bare(back).differences(bare(robot)) == []
-    assert [joint.name for joint in back.joints.values() if joint.actuated] == ["a"]
+    assert [joint.name for joint in back.joints.values() if joint.is_actuated] == ["a"]
 
 
 def test_an_unknown_dialect_is_refused_and_the_given_one_counts(tmp_path: Path):
@@ -129,12 +129,12 @@ def test_mujoco_loads_what_is_written_and_counts_the_same_freedoms(name: str):
     rank = rank_of(np.linalg.svd(J, compute_uv=False)).decided(name)
     assert np.max(np.abs(data.efc_pos[: data.ne])) < 1e-12
     assert model.nv - rank == full_mobility(robot)
-    assert model.nu >= sum(joint.actuated for joint in robot.joints.values())
+    assert model.nu >= sum(joint.is_actuated for joint in robot.joints.values())
 
 
 def test_links_and_joints_of_sdf_share_no_name(tmp_path: Path):
     """As SDFormat demands since 1.7; what comes back is tested above."""
-    save(spanning(every_joint(KINDS, KINDS, 0)), tmp_path / "robot.sdf")
+    save(build_spanning_mechanism(every_joint(KINDS, KINDS, 0)), tmp_path / "robot.sdf")
     names = [each.get("name") for each in etree.parse(tmp_path / "robot.sdf").iter("link", "joint")]
     assert len(set(names)) == len(names)
 

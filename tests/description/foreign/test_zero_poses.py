@@ -13,7 +13,7 @@ from hrsynth import check, derive, legs, modes, observe
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load
 from hrsynth.errors import BadRequest
-from hrsynth.geometry.so3 import exponential, quaternions
+from hrsynth.geometry.so3 import convert_to_quaternions, convert_vectors_to_rotations
 from hrsynth.mechanism import Mechanism
 from oracle import Oracle, span
 
@@ -26,7 +26,7 @@ def leg(seed: int, crank: float = 0.0, hips: int = 0) -> str:
     """The leg of a walking robot, thrown: hip, knee and shin in a row, held by a rod with two balls; below it a foot on
     a four-bar whose crank makes ``crank`` with its rod: at 0 a dead point. ``hips`` more hinges bear the hip."""
     rng = np.random.default_rng(seed)
-    turned = numbers(*quaternions(exponential(rng.normal(size=3))))
+    turned = numbers(*convert_to_quaternions(convert_vectors_to_rotations(rng.normal(size=3))))
     a, b, c, d = rng.uniform([0.3, 0.35, 0.05, 0.2], [0.5, 0.5, 0.08, 0.3])
     joints = "".join(
         f'<body name="hip{k}" pos="{numbers(*rng.uniform(-0.1, 0.1, 3))}">'
@@ -209,7 +209,7 @@ def test_postures_of_srdf_and_sdf(tmp_path: Path):
         assert robot.joints["a"].limits is None or np.isclose(robot.joints["a"].limits.upper, 1.5)
     assert any("root_joint" in note.text for note in robots[0].notes)
     other = load(elsewhere, keyframe="other/ready")
-    assert np.allclose(other.links["upper"].pose[:3, 0], exponential(np.array([0, -0.5, 0]))[:, 0])
+    assert np.allclose(other.links["upper"].pose[:3, 0], convert_vectors_to_rotations(np.array([0, -0.5, 0]))[:, 0])
     with pytest.raises(BadRequest, match="ready"):
         load(elsewhere, keyframe="sleep")
 
@@ -217,7 +217,7 @@ def test_postures_of_srdf_and_sdf(tmp_path: Path):
 def five_bar(bearer: str, *, seed: int = 0, more: str = "") -> str:
     """A five-bar in a turned plane on a carriage that ``bearer`` bears."""
     rng = np.random.default_rng(seed)
-    turned = numbers(*quaternions(exponential(rng.normal(size=3))))
+    turned = numbers(*convert_to_quaternions(convert_vectors_to_rotations(rng.normal(size=3))))
     return f"""<mujoco model="cart"><compiler angle="radian"/><worldbody><body name="stand" quat="{turned}">
  <body name="carriage">{bearer}
   <body name="a1"><joint name="a1" axis="0 0 1"/><body name="b1" pos="0.1 0.3 0"><joint name="b1" axis="0 0 1"/></body>

@@ -19,7 +19,7 @@ from hrsynth.errors import BadRequest, HrsynthError
 from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.present.studio.analysis_service import AnalysisService
 from hrsynth.present.text.tables import NOT_BOUNDED
-from hrsynth.present.view.scale import CONE_TEXT, LOST, error, round_digits
+from hrsynth.present.view.scale import CONE_TEXT, LOST, describe_pose_error, round_digits
 
 DESK = AnalysisService()
 CLOSED = 1e-9
@@ -413,7 +413,7 @@ def test_along_every_slider_the_loops_stay_closed(robot: str):
 
 def test_at_a_singularity_no_error_is_told():
     for example in hrsynth.singularities("3rrr_m1", points=200).examples:
-        told = error(observe("3rrr_m1"), example.configuration)
+        told = describe_pose_error(observe("3rrr_m1"), example.configuration)
         assert (told["mm"], told["step"]) == (None, 4)
         assert told["words"] in (LOST, NOT_BOUNDED)
 
@@ -421,7 +421,7 @@ def test_at_a_singularity_no_error_is_told():
 @pytest.mark.parametrize("robot", ["delta", "quattro", "3rrr_m1", "uranesx"])
 def test_the_error_of_orientation_is_told_where_the_platform_turns(robot: str):
     setup = observe(robot)
-    wrong, turns = error(setup, setup.all_samples.start), setup.motion.rotations.shape[1] > 0
+    wrong, turns = describe_pose_error(setup, setup.all_samples.start), setup.motion.rotations.shape[1] > 0
     assert ("rotation about" in wrong["words"]) == (turns and wrong["words"] != LOST)
     if turns:
         found = hrsynth.accuracy(robot, cone=CONE_TEXT).to_dict()["poses"][0]["orientation_deg"]["largest"]

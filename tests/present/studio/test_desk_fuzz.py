@@ -11,7 +11,7 @@ import pytest
 
 from hrsynth import list_robots
 from hrsynth.errors import BadRequest, HrsynthError
-from hrsynth.present.studio.analysis_service import AnalysisService, names
+from hrsynth.present.studio.analysis_service import AnalysisService, list_request_names
 
 ROBOT = "rrrrr_m1"
 JUNK: list[Any] = [
@@ -85,7 +85,7 @@ def answered(desk: AnalysisService, asked: Any) -> tuple[dict[str, Any] | None, 
 
 
 def test_the_fuzz_knows_every_question():
-    assert tuple(sorted(FIELDS)) == names()
+    assert tuple(sorted(FIELDS)) == list_request_names()
 
 
 @pytest.mark.some(1, 4)

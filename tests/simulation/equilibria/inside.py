@@ -12,8 +12,8 @@ import time
 import numpy as np
 
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.budgets import RUN_AWAY
-from hrsynth.geometry.so3 import logarithm
+from hrsynth.budgets import RUN_ESCAPE_DISTANCE_MAX
+from hrsynth.geometry.so3 import convert_rotations_to_vectors
 from hrsynth.simulation.equilibria.attraction_radius import certified_radius
 from hrsynth.simulation.equilibria.batched_runs import BatchedRuns
 from hrsynth.simulation.equilibria.flow import Flow
@@ -78,10 +78,10 @@ class Inside:
         """How many of the starts end at the goal."""
         count, length = 0, self.flow.batch.length
         for k in range(0, len(X), PART):
-            runs = BatchedRuns(self.flow, X[k : k + PART], RUN_AWAY * length).run(60.0)
+            runs = BatchedRuns(self.flow, X[k : k + PART], RUN_ESCAPE_DISTANCE_MAX * length).run(60.0)
             home = self.flow.batch.home
             gap = np.linalg.norm(runs.X[:, :3, 3] - home[:3, 3], axis=1) / length
-            gap += np.linalg.norm(logarithm(runs.X[:, :3, :3] @ home[:3, :3].T), axis=1)
+            gap += np.linalg.norm(convert_rotations_to_vectors(runs.X[:, :3, :3] @ home[:3, :3].T), axis=1)
             count += int(np.sum((runs.stopped == SERVED_AT) & (gap < 1e-5)))
         return count
 

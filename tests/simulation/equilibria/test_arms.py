@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 
 import hrsynth
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.geometry.vectors import Array, pose
+from hrsynth.geometry.vectors import Array, build_pose
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.simulation.equilibria.equilibrium import Equilibria
 from hrsynth.simulation.equilibria.search import told_by
@@ -58,7 +58,7 @@ class Arm:
         D = np.eye(4)
         for angle, axis, place in zip(q, self.axes, self.places, strict=True):
             R = exponential(angle * axis)
-            D = D @ pose(place - R @ place, R)
+            D = D @ build_pose(place - R @ place, R)
         return np.asarray(D @ self.hand)
 
     def image(self, X: Array) -> Array:

@@ -15,19 +15,26 @@ from scipy.integrate import solve_ivp
 
 import hrsynth
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.analysis.pose_requests import configurations_at
+from hrsynth.analysis.pose_requests import solve_configurations
 from hrsynth.errors import BadRequest, NoReachablePose
-from hrsynth.geometry.screws import point_velocity
-from hrsynth.geometry.vectors import rotation_from_rpy
-from hrsynth.mechanism.pose import asked_pose
-from hrsynth.present.basins import BESIDE, MARKS, SHADES, colours, letter_offsets, picture
+from hrsynth.geometry.screws import compute_point_velocity
+from hrsynth.geometry.vectors import convert_rpy_to_rotation
+from hrsynth.mechanism.pose import parse_pose
+from hrsynth.present.basins import (
+    EQUILIBRIUM_LABEL_POINTS_COUNT,
+    MARKS,
+    SHADES,
+    choose_basin_colours,
+    draw_basins,
+    place_letters,
+)
 from hrsynth.present.figure_format import PNG
 from hrsynth.present.outputs import OUTPUTS
 from hrsynth.present.runs import ENDS
 from hrsynth.simulation.equilibria import basins as module
 from hrsynth.simulation.equilibria.batched_runs import BatchedRuns, Runs
 from hrsynth.simulation.equilibria.flow import Flow
-from hrsynth.simulation.law import DAMPED, directions
+from hrsynth.simulation.law import CONTROLLER_DAMPING_MIN, directions
 from hrsynth.simulation.outcome import ENDINGS, RunOutcome
 from hrsynth.simulation.servo import ServoTask
 from strategies import transformed
@@ -38,7 +45,7 @@ HORIZON = 60.0
 @cache
 def task(name: str, legs: str | None = None, to: str | None = None) -> tuple[ServoTask, Flow]:
     setup = ObservedRobot.of(name, legs)
-    goal = setup.all_samples.start if to is None else configurations_at(setup, [asked_pose(to)])[0]
+    goal = setup.all_samples.start if to is None else solve_configurations(setup, [parse_pose(to)])[0]
     made = ServoTask.between(setup, goal, goal)
     return made, Flow(setup.placer, tuple(setup.labels), made.directions)
 
@@ -78,7 +85,7 @@ def test_the_law_abreast_is_the_law(name: str, legs: str | None, singular: list[
         near[:3, 3], near[:2, :2] = singular[:3], [[c, -s], [s, c]]
         X = np.concatenate([X, near[None]])
     found = flow.at(X, none(flow, len(X)), none(flow, len(X)), flow.roots(X, none(flow, len(X)))[0])
-    assert singular is None or found.weakest[-1] < DAMPED / 10
+    assert singular is None or found.weakest[-1] < CONTROLLER_DAMPING_MIN / 10
     motion, length = made.setup.motion, flow.batch.length
     for pose, at, velocity, size in zip(
         X, flow.configurations(X, none(flow, len(X))), found.velocity, found.size, strict=True
@@ -86,7 +93,7 @@ def test_the_law_abreast_is_the_law(name: str, legs: str | None, singular: list[
         assert at is not None
         command = made.law.at(at, made.desired(0.0))
         twists = at.velocity(motion.link) @ command.velocity / made.law.gain
-        there = point_velocity(twists[:, None], pose[:3, :3] @ motion.point / length)[:, 0] * length
+        there = compute_point_velocity(twists[:, None], pose[:3, :3] @ motion.point / length)[:, 0] * length
         expected = np.concatenate([there, twists[3:]]) if motion.body else there
         ours = flow.batch.span @ velocity
         np.testing.assert_allclose(ours[: len(expected)], expected, atol=1e-6 * max(1.0, np.abs(expected).max()))
@@ -155,9 +162,9 @@ def test_runs_of_all_robots_abreast_end_where_single_runs_end(name: str, legs: s
 def test_a_leg_is_passed_at_whose_limit_the_law_changes_abruptly():
     legs, to = "2,4,5", "x=0.226256,y=0.0454127,z=-0.583372,rpy=0.850469/-0.102548/-0.554838"
     motion = task("hexa", legs, to)[0].setup.motion
-    start = asked_pose("x=0.342403,y=0.0901673,z=-0.353974,rpy=-0.481852/-0.152309/-0.40517")
+    start = parse_pose("x=0.342403,y=0.0901673,z=-0.353974,rpy=-0.481852/-0.152309/-0.40517")
     X = motion.home.copy()
-    X[:3, :3] = rotation_from_rpy(*start.rpy)
+    X[:3, :3] = convert_rpy_to_rotation(*start.rpy)
     X[:3, 3] = np.array([start.x, start.y, start.z]) - X[:3, :3] @ motion.point
     assert ends_agree("hexa", legs, X[None], to) == 1
 
@@ -309,7 +316,7 @@ def test_every_start_within_the_certified_radius_ends_at_the_goal():
     X = flow.move(
         np.repeat(goal[None], 200, axis=0), y * [1, 1, 0] + rng.uniform(-1, 1, (200, 1)) * [0, 0, found.certified.angle]
     )
-    X = X[[found.certified.holds(each) for each in X]]
+    X = X[[found.certified.has_start(each) for each in X]]
     assert len(X) > 20
     np.testing.assert_allclose(runs(flow, X).X, np.broadcast_to(goal, X.shape), atol=1e-8)
 
@@ -346,7 +353,7 @@ def test_lines_and_boxes_are_drawn(grid: str, tmp_path):
 
 @pytest.mark.slow
 def test_ends_are_drawn_where_a_robot_stands_aslant_too(tmp_path, monkeypatch: pytest.MonkeyPatch):
-    R = rotation_from_rpy(0.5, -0.3, 0.2)
+    R = convert_rpy_to_rotation(0.5, -0.3, 0.2)
     robot = transformed(hrsynth.load("3rrr_m1"), R, np.array([0.1, 0.2, 0.3]))
     x, y, _ = hrsynth.observe(robot).motion.home[:3, 3]
     grid = f"x={x - 0.01}:{x + 0.01}:2,y={y - 0.01}:{y + 0.01}:2,phi=0"
@@ -388,8 +395,8 @@ def test_every_ending_has_its_colours_and_its_mark():
 def test_letters_of_ends_that_are_near_each_other_are_apart(marks: list[tuple[float, float]]):
     """A letter is 9 points tall: none is on another one, nor on the mark of another end."""
     places = np.array(marks, dtype=float)
-    letters = places + np.array(letter_offsets(places, BESIDE))
-    assert np.linalg.norm(letters - places, axis=1) == pytest.approx(BESIDE)
+    letters = places + np.array(place_letters(places, EQUILIBRIUM_LABEL_POINTS_COUNT))
+    assert np.linalg.norm(letters - places, axis=1) == pytest.approx(EQUILIBRIUM_LABEL_POINTS_COUNT)
     assert min(np.linalg.norm(a - b) for i, a in enumerate(letters) for b in letters[:i]) > 9
     assert min(np.linalg.norm(a - b) for a in letters for b in places) > 9
 
@@ -433,7 +440,7 @@ def test_why_runs_are_simulated_one_by_one_is_told():
 )
 def test_hollow_marks_are_in_the_legend_where_there_is_one(grid: str, hollow: bool):
     found = hrsynth.basins("3rrr_m1", goal="x=0,y=0,phi=0", grid=grid, jobs=1)
-    drawn = picture(found, replace(PNG, ending=".svg")).decode()
+    drawn = draw_basins(found, replace(PNG, ending=".svg")).decode()
     assert ("hollow: other" in drawn) == hollow
 
 
@@ -450,13 +457,13 @@ def test_the_legend_has_the_marks_that_are_drawn_and_no_others():
             goal,
             *(replace(goal, run_outcome=RunOutcome("limit reached", "a leg is stretched"), X=X) for _ in range(7)),
         )
-        drawn = picture(replace(found, ends=ends), replace(PNG, ending=".svg")).decode()
+        drawn = draw_basins(replace(found, ends=ends), replace(PNG, ending=".svg")).decode()
         assert (ENDS["limit reached"] in drawn) is told
         assert ENDS["goal"] in drawn
-        shades = np.array([to_rgb(each) for each in colours(ends)])
+        shades = np.array([to_rgb(each) for each in choose_basin_colours(ends)])
         apart = np.abs(shades[:, None] - shades).max(axis=2) + np.eye(len(ends))
         assert apart.min() > 0.05
-    assert colours(found.ends) == [SHADES["goal"][0]]
+    assert choose_basin_colours(found.ends) == [SHADES["goal"][0]]
 
 
 def test_starts_out_of_reach_are_refused():

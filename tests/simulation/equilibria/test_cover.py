@@ -14,12 +14,12 @@ from scipy.spatial.transform import Rotation
 
 from hrsynth import load
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.analysis.pose_requests import configurations_at
-from hrsynth.budgets import COVER_BOXES
+from hrsynth.analysis.pose_requests import solve_configurations
+from hrsynth.budgets import SUBDIVISION_BOXES_MAX
 from hrsynth.closed_forms.legs import OnCrank, OnRail, OnRod, SlidingRod
-from hrsynth.geometry.affine import affine
+from hrsynth.geometry.affine import make_affine
 from hrsynth.geometry.vectors import Array, hat
-from hrsynth.mechanism.pose import asked_pose
+from hrsynth.mechanism.pose import parse_pose
 from hrsynth.simulation.equilibria.exhaustive_search import (
     SubdivisionResult,
     _cut_long,
@@ -33,7 +33,7 @@ from hrsynth.simulation.equilibria.joint_bounds import narrow_joint, narrow_join
 from hrsynth.simulation.equilibria.joint_error import JointError, across
 from hrsynth.simulation.equilibria.pose_error import PoseError
 from hrsynth.simulation.equilibria.subdivision import Subdivision, forms_of
-from hrsynth.tolerances import LOCKED_PLACE, SMALLEST_BOX
+from hrsynth.tolerances import LOCKED_PLACE_EDGE_FRACTION, POSE_BOX_MIN_FRACTION
 from simulation import scenes
 from strategies import random_rotation, transformed
 
@@ -111,7 +111,7 @@ def test_rates_by_pose_and_joints_are_those_of_differences(name):
         y = rng.uniform(0.2, 1.0, (3, n))
 
         def at(formula, y):
-            forms = [affine(x, np.zeros((len(y), 0)), 0 * x) for x in y.T]
+            forms = [make_affine(x, np.zeros((len(y), 0)), 0 * x) for x in y.T]
             return np.array([each.v[0] for each in formula.at(forms)]).T
 
         told = at(error.slopes, y)
@@ -143,7 +143,8 @@ def test_joints_are_narrowed_to_where_the_legs_close(name):
         if half:
             a[n - k :], b[n - k :] = np.sort(rng.uniform(a, b, (2, n)), axis=0)[:, n - k :]
         forms = [
-            affine(x[None], each[None], np.zeros(1)) for x, each in zip((a + b) / 2, np.diag((b - a) / 2), strict=True)
+            make_affine(x[None], each[None], np.zeros(1))
+            for x, each in zip((a + b) / 2, np.diag((b - a) / 2), strict=True)
         ]
         inner, outer = narrow_joints(error, forms, a[None], b[None])
         for i in range(n - k, n):
@@ -151,7 +152,7 @@ def test_joints_are_narrowed_to_where_the_legs_close(name):
                 y = np.tile(pose + room * rng.uniform(-1, 1, n - k), (len(places), 1))
                 y = np.hstack([y, np.zeros((len(y), k))])
                 y[:, i] = a[i] + places * (b[i] - a[i])
-                g = error.closing.at([affine(x, np.zeros((len(y), 0)), 0 * x) for x in y.T])[i - n + k].v[0]
+                g = error.closing.at([make_affine(x, np.zeros((len(y), 0)), 0 * x) for x in y.T])[i - n + k].v[0]
                 zeros = y[:-1, i][g[:-1] * g[1:] < 0]
                 met += len(zeros)
                 step = (b[i] - a[i]) / len(places)
@@ -181,7 +182,7 @@ def closed(error, y, P):
     y = y.copy()
     for _ in range(12):
         told = np.array(
-            [each.v[0] for each in error.slopes.at([affine(x, np.zeros((len(y), 0)), 0 * x) for x in y.T])]
+            [each.v[0] for each in error.slopes.at([make_affine(x, np.zeros((len(y), 0)), 0 * x) for x in y.T])]
         ).T
         g, M = told[:, :k], told[:, k : k + k * n].reshape(-1, k, n)
         step = np.linalg.pinv(np.take_along_axis(M, P[:, None], 2)) @ g[..., None]
@@ -238,7 +239,7 @@ def test_moments_about_a_tip_are_those_of_the_other_legs(name):
         y = closed(error, rng.uniform(low, high)[None], np.arange(n - k, n)[None])
         if np.isnan(y).any():
             continue
-        forms = [affine(x, np.zeros((1, 0)), 0 * x) for x in y.T]
+        forms = [make_affine(x, np.zeros((1, 0)), 0 * x) for x in y.T]
         told = np.array([each.v[0, 0] for each in error.moments.at(forms)])
         M = np.array([each.v[0, 0] for each in error.slopes.at(forms)])[k : k + k * n].reshape(k, n)
         p, R = (each[0] for each in error.pose(y))
@@ -310,7 +311,7 @@ def test_a_closed_surface_of_poses_has_the_kinds_that_its_shape_asks_for():
     rng = np.random.default_rng(0)
     setup = ObservedRobot.of(transformed(load("prrrp_m1"), random_rotation(rng), rng.normal(size=3)))
     found = cover(setup, setup.all_samples.start)
-    assert found.complete
+    assert found.is_complete
     assert found.bounded
     assert [sum(each.falling == k for each in found.found) for k in range(3)] == [4, 8, 4]
     assert sum(each.error[0] < 1e-5 for each in found.found) == 4
@@ -322,9 +323,9 @@ def test_a_closed_surface_of_poses_has_the_kinds_that_its_shape_asks_for():
 def test_no_other_critical_point_is_met(name, budget):
     """Where boxes are left open, they are told; away from them the list is whole."""
     setup = ObservedRobot.of(name)
-    found = cover(setup, setup.all_samples.start, budget=budget or COVER_BOXES, reach=3.0)
-    assert found.complete is (budget is None)
-    assert bool(found.open) is not found.complete
+    found = cover(setup, setup.all_samples.start, budget=budget or SUBDIVISION_BOXES_MAX, reach=3.0)
+    assert found.is_complete is (budget is None)
+    assert bool(found.open) is not found.is_complete
     assert unlisted(setup, found, np.random.default_rng(1)) == []
 
 
@@ -342,7 +343,7 @@ def test_kinds_sum_up_to_the_number_of_the_closures(name, number):
     dimensions the number is 0."""
     setup = ObservedRobot.of(name)
     found = cover(setup, setup.all_samples.start)
-    assert found.complete
+    assert found.is_complete
     assert sum((-1) ** each.falling for each in found.found) == number
 
 
@@ -352,7 +353,7 @@ def test_the_rests_of_three_sliders_are_all_but_where_they_lock():
     rails, side by side."""
     setup = ObservedRobot.of("orthoglide")
     found = cover(setup, setup.all_samples.start)
-    assert found.complete
+    assert found.is_complete
     assert [sum(each.falling == k for each in found.found) for k in range(4)] == [8, 32, 32, 8]
     assert unlisted(setup, found, np.random.default_rng(1), 12) == []
     error = PoseError.of(setup, setup.all_samples.start)
@@ -386,9 +387,9 @@ def test_rests_of_platforms_that_translate_are_listed(name, at, kinds):
     """On inclined slides, and on cranks: nothing is left open but the places that lock, and no other rest is met. Half
     an hour for four legs."""
     setup = ObservedRobot.of(name)
-    goal = configurations_at(setup, [asked_pose(at)])[0]
+    goal = solve_configurations(setup, [parse_pose(at)])[0]
     found = cover(setup, goal, budget=70_000_000)
-    assert found.complete
+    assert found.is_complete
     assert found.bounded
     assert [sum(each.falling == k for each in found.found) for k in range(4)] == kinds
     assert unlisted(setup, found, np.random.default_rng(1), 12, goal) == []
@@ -400,7 +401,7 @@ def test_rests_are_listed_however_far_away_they_are():
     beside its parts; one is 274 lengths away. Each zero of it that least squares meets is a member."""
     setup, goal = scenes.setting("3rpr_m1"), scenes.goal("3rpr_m1")
     found = cover(setup, goal)
-    assert found.complete
+    assert found.is_complete
     assert found.bounded
     error = PoseError.of(setup, goal)
     hips = np.array([limb.centre[:2] for limb in error.limbs])
@@ -467,7 +468,7 @@ def test_only_short_places_are_told_as_ones_that_lock(monkeypatch):
 
     monkeypatch.setattr(Subdivision, "run", made)
     found = cover(setup, setup.all_samples.start)
-    assert not found.complete
+    assert not found.is_complete
     assert len(found.locked) == 3
     assert all(np.isfinite(each).all() for place in found.locked for each in place)
     assert len(found.open) == 1
@@ -479,7 +480,7 @@ def test_only_short_places_are_told_as_ones_that_lock(monkeypatch):
     monkeypatch.setattr(Subdivision, "run", chain)
     monkeypatch.setattr(Subdivision, "cut_lost", lambda *_: None)
     found = cover(setup, setup.all_samples.start)
-    assert not found.complete
+    assert not found.is_complete
     assert (len(found.locked), len(found.open)) == (0, 1)
 
 
@@ -496,7 +497,7 @@ def test_smallest_boxes_about_a_flat_zero_are_settled():
     x = part._approach(part._approach(part._approach(x)))
     way = np.linalg.svd(part._equations(x, forms_of(x, 0 * x))[1].v[0, 0])[2][-1, :6]
     middle = x[:, :6] + 4e-6 * np.linspace(-1, 1, 12)[:, None] * way / np.abs(way).max()
-    half = np.broadcast_to(SMALLEST_BOX * part.whole, middle.shape)
+    half = np.broadcast_to(POSE_BOX_MIN_FRACTION * part.whole, middle.shape)
     assert part._near_zero(middle, half, np.broadcast_to([3, 4, 5], (12, 3))).all()
     assert 0 < len(part.flat) < 5
     assert len(part._open(middle, half)[0]) == 0
@@ -595,7 +596,7 @@ def test_a_place_that_locks_is_at_a_turn(turn: float, inside: bool) -> None:
     told = SubdivisionResult(
         (), (), 0.0, 0, True, error=error, locked=((np.array([0.0, 0.0, 0.0, turn]), np.full(4, 0.01)),)
     )
-    assert told.holds(goal) is not inside
+    assert told.has_searched(goal) is not inside
 
 
 @pytest.mark.slow
@@ -617,11 +618,11 @@ def test_boxes_that_fill_a_long_place_are_cut_finer() -> None:
 
     assert part.lost
     assert not part.left
-    assert longest() > LOCKED_PLACE
+    assert longest() > LOCKED_PLACE_EDGE_FRACTION
     _cut_long([part], size, 500_000, 1)
     assert part.lost
     assert not part.left
-    assert longest() < LOCKED_PLACE / 2
+    assert longest() < LOCKED_PLACE_EDGE_FRACTION / 2
 
 
 @pytest.mark.slow
@@ -630,18 +631,18 @@ def test_nothing_depends_on_the_number_of_processes(monkeypatch: pytest.MonkeyPa
     what they hold."""
     setup = ObservedRobot.of("rrrrr_m1")
     alone = cover(setup, setup.all_samples.start)
-    monkeypatch.setattr("hrsynth.simulation.equilibria.subdivision.BOXES_ALONE", 300)
+    monkeypatch.setattr("hrsynth.simulation.equilibria.subdivision.SERIAL_SUBDIVISION_BOXES_COUNT", 300)
     monkeypatch.setattr("hrsynth.simulation.equilibria.subdivision.BOXES_A_PART", 100)
     for jobs in (1, 2):
         shared = cover(setup, setup.all_samples.start, jobs=jobs)
-        assert shared.complete
+        assert shared.is_complete
         assert shared.boxes == alone.boxes
         assert len(shared.found) == len(alone.found) == 30
         places = np.array([each.x for each in shared.found])
         assert all(np.abs(places - each.x).max(axis=1).min() < 1e-9 for each in alone.found)
     few = cover(setup, setup.all_samples.start, jobs=2, budget=2000)
     assert few.spent
-    assert not few.complete
+    assert not few.is_complete
     assert few.boxes == 2000
 
 
@@ -659,7 +660,7 @@ def test_small_open_boxes_belong_to_the_place_that_they_touch(seed):
     place, order = (np.full(3, -2e-5), np.full(3, 2e-5)), rng.permutation(len(chain) + 2)
     left = [[*chain, apart, large][i] for i in order]
     locked, others = _places([place], left, whole)
-    if 5e-5 * (steps - 1) + 4e-5 <= LOCKED_PLACE:
+    if 5e-5 * (steps - 1) + 4e-5 <= LOCKED_PLACE_EDGE_FRACTION:
         ((middle, half),) = locked
         assert all(np.all(np.abs(each - middle) <= half + 1e-15) for corners in [place, *chain] for each in corners)
         assert len(others) == 2
@@ -682,7 +683,7 @@ def test_the_goal_is_listed_as_a_minimum():
 def test_what_is_not_covered_says_why():
     setup = ObservedRobot.of("gough_stewart")
     found = cover(setup, setup.all_samples.start)
-    assert not found.complete
+    assert not found.is_complete
     assert "more than one axis" in found.reason
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from analysis.test_sensors import KINDS, arm, free_body, watched
-from hrsynth.analysis.observed import ObservedRobot, motors
+from hrsynth.analysis.observed import ObservedRobot, build_motor_model
 from hrsynth.description import load
-from hrsynth.geometry.affine import affine
+from hrsynth.geometry.affine import make_affine
 from hrsynth.kinematics.configuration import ClosedConfiguration, measure
 from hrsynth.mechanism.observations.direction import SeenAxis
 from hrsynth.mechanism.observations.image_circle import ImageCircle
@@ -52,7 +52,7 @@ def check(found: ObservedRobot, encoders: bool = False, wide: float = 1e-4) -> N
     """E, its derivatives and their enclosures over a box that is so wide; with cameras where E bends least, far from
     their focal planes; of circles in the image where they are least edge-on, as their moments have digits there."""
     rng = np.random.default_rng(3)
-    observation_model = motors(found) if encoders else found.samples.observation_model
+    observation_model = build_motor_model(found) if encoders else found.samples.observation_model
     goal = found.configurations[0]
     rest = ErrorSystem.of(goal, observation_model, found.configurations)
     size, count = rest.size
@@ -95,8 +95,8 @@ def check(found: ObservedRobot, encoders: bool = False, wide: float = 1e-4) -> N
     bend = [(a.pull(mu) - b.pull(mu))[0] / (2 * STEP) for a, b in zip(ahead, behind, strict=True)]
     assert here.pull(mu)[0] == pytest.approx(np.array(slope), abs=1e-7 * max(1.0, np.abs(slope).max()))
     assert here.bend(mu)[0] == pytest.approx(np.array(bend), abs=1e-7 * max(1.0, np.abs(bend).max()))
-    boxes = CriticalPointEquations(rest, [affine(np.array([x]), np.zeros((1, 0)), np.full(1, wide)) for x in q])
-    held = affine(mu, np.zeros((1, count, 0)), np.zeros((1, count)))
+    boxes = CriticalPointEquations(rest, [make_affine(np.array([x]), np.zeros((1, 0)), np.full(1, wide)) for x in q])
+    held = make_affine(mu, np.zeros((1, count, 0)), np.zeros((1, count)))
     near = equations(q + wide * rng.uniform(-1, 1, size))
     for form, value in (
         (boxes.E, near.E),

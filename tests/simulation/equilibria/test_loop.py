@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hrsynth.analysis.pose_requests import configurations_at
+from hrsynth.analysis.pose_requests import solve_configurations
 from hrsynth.closed_forms.legs import OnCrank, OnRail
-from hrsynth.mechanism.pose import asked_pose
+from hrsynth.mechanism.pose import parse_pose
 from hrsynth.simulation.equilibria.equilibria import EquilibriumSearch
 from hrsynth.simulation.equilibria.exhaustive_search import cover, reachable_box
 from hrsynth.simulation.equilibria.joint_error import JointError
@@ -182,7 +182,7 @@ def test_no_other_rest_is_met_by_hand(legs: str, count: int) -> None:
     """Lagrange's equations of the Quattro, written by hand, vanish at each rest of the list, and Newton's method on
     them meets no other that all legs reach, but where no force closes the loop."""
     found = cover(scenes.setting("quattro", tuple(legs)), scenes.goal("quattro"))
-    assert found.complete
+    assert found.is_complete
     wanted = goal_directions(legs)
 
     def slope(y):
@@ -240,7 +240,7 @@ def test_a_platform_that_translates_rests_also_across_one_direction(
     """Boxes and the search over all joints list the same rests while the other legs are not stretched, those among them
     at which one direction is along the desired one and the other at right angles."""
     setup = scenes.setting(name, tuple(legs))
-    (goal,) = configurations_at(setup, [asked_pose(at)])
+    (goal,) = solve_configurations(setup, [parse_pose(at)])
     found = EquilibriumSearch.of(setup, goal).answer(0, complete=True)
     assert found.complete
     assert found.subdivision is not None

@@ -9,14 +9,14 @@ import pytest
 
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import list_robots, load
-from hrsynth.geometry.affine import affine
-from hrsynth.geometry.so3 import exponential
+from hrsynth.geometry.affine import make_affine
+from hrsynth.geometry.so3 import convert_vectors_to_rotations
 from hrsynth.simulation.equilibria.critical_poses import CriticalPoses, PoseToJoints
 from hrsynth.simulation.equilibria.descent import CriticalPoint
 from hrsynth.simulation.equilibria.equilibria import EquilibriumSearch
 from hrsynth.simulation.equilibria.exhaustive_search import cover
 from hrsynth.simulation.equilibria.points_in_planes_error import PlaneError, factors
-from hrsynth.simulation.equilibria.pose_error import NotEnclosed
+from hrsynth.simulation.equilibria.pose_error import EnclosureFailure
 from hrsynth.simulation.equilibria.search import DistinctPoints
 from simulation import scenes
 
@@ -56,7 +56,7 @@ def level(s):
 
 
 def at(formula, y):
-    forms = [affine(x, np.zeros((len(y), 0)), 0 * x) for x in y.T]
+    forms = [make_affine(x, np.zeros((len(y), 0)), 0 * x) for x in y.T]
     return np.array([np.broadcast_to(each.v[0], len(y)) for each in formula.at(forms)]).T
 
 
@@ -154,7 +154,7 @@ def test_forms_of_rank_two_are_factors():
     assert left[0] is form
     assert list(factors(np.eye(4), [np.eye(4)])) == []
     for touching in (np.outer(a, a), np.outer(a, a) + np.outer(b, b)):
-        with pytest.raises(NotEnclosed):
+        with pytest.raises(EnclosureFailure):
             list(factors(np.eye(4), [touching]))
 
 
@@ -164,7 +164,7 @@ def test_where_closures_meet_a_slope_along_one_of_them_is_no_rest():
     setup, goal = scenes.setting("3rps"), scenes.goal("3rps")
     search = EquilibriumSearch.of(setup, goal)
     axis = 3.0631801519497515 / 2
-    R = exponential(np.pi * np.array([np.cos(axis), np.sin(axis), 0.0]))
+    R = convert_vectors_to_rotations(np.pi * np.array([np.cos(axis), np.sin(axis), 0.0]))
     p = np.array([0.0, 0.0, 0.3328])
     offsets = PLATFORM * np.einsum("ij,ij->i", WAYS @ R.T, TANGENTS)
     p[:2] = -np.linalg.lstsq(TANGENTS[:, :2], offsets, rcond=None)[0]
@@ -173,13 +173,13 @@ def test_where_closures_meet_a_slope_along_one_of_them_is_no_rest():
 
     def along(turn):
         """E on the goal's family, its turns about axes of the base's plane."""
-        own = exponential(np.pi * np.array([np.cos(axis), np.sin(axis), 0.0]) * (1 + turn / np.pi))
+        own = convert_vectors_to_rotations(np.pi * np.array([np.cos(axis), np.sin(axis), 0.0]) * (1 + turn / np.pi))
         off = PLATFORM * np.einsum("ij,ij->i", WAYS @ own.T, TANGENTS)
         way = rods(np.array([*-np.linalg.lstsq(TANGENTS[:, :2], off, rcond=None)[0], 0.3328]), own)
         assert np.abs((way * TANGENTS).sum(axis=1)).max() < 1e-12
         return level(np.stack([(way * WAYS).sum(axis=1), way[:, 2]], axis=1))
 
-    assert family.holds(exponential(3.0 * np.array([np.cos(axis), np.sin(axis), 0.0])))
+    assert family.holds(convert_vectors_to_rotations(3.0 * np.array([np.cos(axis), np.sin(axis), 0.0])))
     assert abs(along(STEP) - along(-STEP)) / (2 * STEP) > 0.05
     u = rods(p, R) / np.linalg.norm(rods(p, R), axis=1)[:, None]
     none = np.zeros(1, dtype=np.intp)
@@ -234,7 +234,7 @@ def test_all_rests_of_the_two_families_are_listed():
     Lagrange's equations over the three points meets all of them and no other; their kinds sum up to nothing in each of
     the families, which are closed but for where E is the same all over."""
     found = cover(scenes.setting("3rps"), scenes.goal("3rps"))
-    assert found.complete
+    assert found.is_complete
     assert found.bounded
     assert not found.locked
     assert len(found.found) == 8 * 40
@@ -275,7 +275,7 @@ def test_rests_of_a_robot_without_symmetry_are_one_family(tmp_path):
     (family,) = PlaneError.families(setup, setup.all_samples.start)
     assert len(family.forms) == 1
     found = cover(setup, setup.all_samples.start)
-    assert found.complete
+    assert found.is_complete
     assert not found.locked
     falling = [each.falling for each in found.found]
     assert [falling.count(k) for k in range(4)] == [56, 120, 128, 64]

@@ -9,8 +9,8 @@ import pytest
 from hrsynth import load
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.batch.enclosures import trace_formula
-from hrsynth.geometry.affine import affine
-from hrsynth.geometry.so3 import exponential, logarithm
+from hrsynth.geometry.affine import make_affine
+from hrsynth.geometry.so3 import convert_rotations_to_vectors, convert_vectors_to_rotations
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.tasks import solve
 from hrsynth.mechanism.model import Limits
@@ -35,8 +35,8 @@ def test_the_point_is_told_where_poses_tell_another():
     goal = start.pose(link)
     assert found.verdict == CERTIFIED
     turned = goal.copy()
-    turned[:3, :3] = exponential(np.array([0.0, 0.0, 1.0])) @ goal[:3, :3]
-    assert not found.holds(turned)
+    turned[:3, :3] = convert_vectors_to_rotations(np.array([0.0, 0.0, 1.0])) @ goal[:3, :3]
+    assert not found.has_start(turned)
     for words in (found.words, found.undamped_words):
         assert words is None or words.endswith("measured at the point (-0.169 0.107 0) m of dist_2")
     assert "measured" not in certified_radius(ObservedRobot.of(load("3rrr_m1")), start_of("3rrr_m1")).words
@@ -59,7 +59,7 @@ def starts(found, rng, count):
     poses = np.tile(np.eye(4), (count, 1, 1))
     poses[:, :3, :3] = X[:3, :3]
     if found.angle is not None:
-        poses[:, :3, :3] = exponential(ball(motion.rotations, found.angle)) @ X[:3, :3]
+        poses[:, :3, :3] = convert_vectors_to_rotations(ball(motion.rotations, found.angle)) @ X[:3, :3]
     poses[:, :3, 3] = p + ball(motion.translations, found.length) - poses[:, :3, :3] @ motion.point
     return poses
 
@@ -82,14 +82,14 @@ def ends(setup, found, poses, steps=120, step=0.25):
     def moved(X, v, h):
         new = X.copy()
         p = X[:, :3, :3] @ motion.point + X[:, :3, 3]
-        new[:, :3, :3] = exponential(h * v[:, 3:]) @ X[:, :3, :3]
+        new[:, :3, :3] = convert_vectors_to_rotations(h * v[:, 3:]) @ X[:, :3, :3]
         new[:, :3, 3] = p + h * v[:, :3] - new[:, :3, :3] @ motion.point
         return new
 
     X = poses
     for _ in range(steps):
         X = moved(X, rate(moved(X, rate(X), step / 2)), step)
-    turn = np.linalg.norm(logarithm(X[:, :3, :3] @ goal[:3, :3].T), axis=1)
+    turn = np.linalg.norm(convert_rotations_to_vectors(X[:, :3, :3] @ goal[:3, :3].T), axis=1)
     return np.linalg.norm(X[:, :3, 3] - goal[:3, 3], axis=1) + turn
 
 
@@ -175,7 +175,7 @@ def test_roots_and_inverses_of_forms_hold_those_of_numbers():
     rng = np.random.default_rng(1)
     formula = trace_formula(lambda x, number: [1.0 / (x[0] * number(0.3) - x[1]), (x[0] * x[1]).sqrt()], 2)
     middle, half = rng.uniform(0.3, 2, (500, 2)), rng.uniform(0, 0.3, (500, 2))
-    found = formula.at([affine(middle[:, i], half[:, i, None] * np.eye(2)[i], np.zeros(500)) for i in range(2)])
+    found = formula.at([make_affine(middle[:, i], half[:, i, None] * np.eye(2)[i], np.zeros(500)) for i in range(2)])
     for _ in range(50):
         x = middle + half * rng.uniform(-1, 1, (500, 2))
         for form, value in zip(found, (1 / (0.3 * x[:, 0] - x[:, 1]), np.sqrt(x[:, 0] * x[:, 1])), strict=True):

@@ -18,16 +18,16 @@ from scipy.optimize import least_squares
 import hrsynth
 from hrsynth.analysis.modes.modes import modes
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.constraints.pattern import placing_links
+from hrsynth.constraints.pattern import list_placing_links
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.affine import AffineForms
-from hrsynth.geometry.so3 import exponential, logarithm
-from hrsynth.geometry.vectors import pose, pose_difference
+from hrsynth.geometry.so3 import convert_rotations_to_vectors, convert_vectors_to_rotations
+from hrsynth.geometry.vectors import build_pose, compare_poses
 from hrsynth.kinematics.chart import TangentChart
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.locked_twists import joint_at
+from hrsynth.kinematics.locked_twists import locate_joint
 from hrsynth.mechanism.model import Limits
-from hrsynth.present.text.equilibria import equilibria as text
+from hrsynth.present.text.equilibria import format_equilibria as text
 from hrsynth.simulation.equilibria.completeness import CompletenessProof
 from hrsynth.simulation.equilibria.critical_poses import CriticalPoses, PoseToJoints, _held_sets, critical_poses
 from hrsynth.simulation.equilibria.descent import CriticalPoint, Tangents, descend, walk_at_random
@@ -133,10 +133,10 @@ def test_starts_go_as_far_as_slides_do(tmp_path: Path):
 def test_boxes_prove_all_rests_of_a_rod_on_slides_that_is_the_platform(seed: int, tmp_path: Path):
     case = OnSlides(tmp_path, seed)
     told = cover(case.robot, case.robot.all_samples.start, budget=2_000_000)
-    assert told.complete
+    assert told.is_complete
     assert told.bounded
     assert len(told.found) == 16
-    poses = [pose(box.p, box.R) for box in told.found]
+    poses = [build_pose(box.p, box.R) for box in told.found]
     assert all(case.count(slides, turn, poses) == 1 for slides, turn in case.rests)
 
 
@@ -218,7 +218,7 @@ def test_lists_of_modes_are_among_the_rests() -> None:
         own = [each for each in found.points if each.kind != "critical" and each.reversed == signs.reversed]
         assert signs.boxes == len(own)
         if not own:
-            assert signs.empty
+            assert signs.is_proved_empty
             continue
         again = modes(found.setup, at=own[0].configuration)
         assert signs.complete == again.found.complete
@@ -242,7 +242,7 @@ def test_the_sides_of_rests_are_those_of_the_condition() -> None:
 
     def sine(at: ClosedConfiguration) -> float:
         ends = [
-            [joint_at(at, at.model.mechanism.joints[name])[0] for name in leg.joints[:2]]
+            [locate_joint(at, at.model.mechanism.joints[name])[0] for name in leg.joints[:2]]
             for leg in found.setup.decomposition.legs
         ]
         one, other = ((b - a) / np.linalg.norm(b - a) for a, b in ends)
@@ -392,8 +392,8 @@ def test_what_is_alone_in_its_box_may_share_its_pose() -> None:
         (one, other)
         for one, other in combinations([each for each in found.points if each.proved], 2)
         if all(
-            pose_difference(one.configuration.pose(link), other.configuration.pose(link), scale) < 1e-9
-            for link in placing_links(found.setup.decomposition)
+            compare_poses(one.configuration.pose(link), other.configuration.pose(link), scale) < 1e-9
+            for link in list_placing_links(found.setup.decomposition)
         )
     ]
     assert same
@@ -595,7 +595,7 @@ def body(folder: Path, sensor: list[str], **options: Any) -> Equilibria:
 
 def pulled(x: np.ndarray, at: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """∇½‖e‖², e that of image points at a pose x (translation, rotation vector), by hand."""
-    arms = at @ exponential(x[3:]).T
+    arms = at @ convert_vectors_to_rotations(x[3:]).T
     p = arms + x[:3]
     e = p[:, :2] / p[:, 2:] - wanted
     force = np.column_stack([e, -np.sum(p[:, :2] / p[:, 2:] * e, axis=1)]) / p[:, 2:]
@@ -618,7 +618,7 @@ def test_four_image_points_of_a_tilted_square(tmp_path: Path) -> None:
     ]
     assert all(each.proved and each.decided for each in found.points)
     for each, X in zip(found.points, poses, strict=True):
-        x = np.append(X[:3, 3], logarithm(X[:3, :3]))
+        x = np.append(X[:3, 3], convert_rotations_to_vectors(X[:3, :3]))
         assert pulled(x, SQUARE, wanted) == pytest.approx(np.zeros(6), abs=1e-11)
         shown = SQUARE @ X[:3, :3].T + X[:3, 3]
         assert np.linalg.norm(shown[:, :2] / shown[:, 2:] - wanted) == pytest.approx(each.error, abs=1e-12)
@@ -633,7 +633,7 @@ def test_four_image_points_of_a_tilted_square(tmp_path: Path) -> None:
         start = np.array([*away, z, *turn])
         with suppress(ValueError):
             end = least_squares(pulled, start, args=(SQUARE, wanted), xtol=1e-15, ftol=1e-15, gtol=1e-15).x
-            X = pose(end[:3], exponential(end[3:]))
+            X = build_pose(end[:3], convert_vectors_to_rotations(end[3:]))
             ahead = np.min(SQUARE @ X[2, :3] + X[2, 3])
             if np.abs(pulled(end, SQUARE, wanted)).max() < 1e-11 and 1e-3 < ahead < 30:
                 apart = [np.abs(X - each).max() for each in poses]
@@ -726,7 +726,7 @@ def test_a_flat_direction_never_attracts_for_sure(curvatures: list[float], word:
 @pytest.mark.parametrize("reach", [0.3, 2.25])
 def test_rests_within_the_limits_of_joints_are_counted(reach: float) -> None:
     robot = hrsynth.load(FIVE_BAR)
-    motors = [joint for joint in robot.joints.values() if joint.actuated]
+    motors = [joint for joint in robot.joints.values() if joint.is_actuated]
     found = equilibria(
         robot.changed(joints=[replace(joint, limits=Limits(-reach, reach)) for joint in motors]), goal=POSE
     )

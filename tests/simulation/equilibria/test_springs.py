@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from hrsynth.closed_forms.legs import OnCrank
-from hrsynth.present.text.equilibria import _complete
+from hrsynth.present.text.equilibria import _describe_completeness
 from hrsynth.simulation.equilibria.equilibrium import CompletenessReport
-from hrsynth.simulation.equilibria.exhaustive_search import SubdivisionResult, _same, cover
-from hrsynth.simulation.equilibria.pose_error import NotEnclosed, PoseError
+from hrsynth.simulation.equilibria.exhaustive_search import SubdivisionResult, _is_same_zero, cover
+from hrsynth.simulation.equilibria.pose_error import EnclosureFailure, PoseError
 from hrsynth.simulation.equilibria.spring_error import SpringError, SpringSubdivision
 from hrsynth.simulation.equilibria.subdivision import CriticalBox, forms_of
 from simulation import scenes
@@ -252,7 +252,7 @@ def test_rests_half_a_turn_apart_are_two() -> None:
         boxes += part.zeros()
         assert not part.left
     assert len(boxes) == 2
-    assert [[_same(one, other, SpringError.about(error)) for one in boxes] for other in boxes] == [
+    assert [[_is_same_zero(one, other, SpringError.about(error)) for one in boxes] for other in boxes] == [
         [True, False],
         [False, True],
     ]
@@ -262,7 +262,10 @@ def test_words_except_legs_without_a_length() -> None:
     """Where rests are those of springs, legs that are not watched may be telescopic ones."""
     told = CompletenessReport(SubdivisionResult((), (), 0.0, 10, True, loop=SpringError.about(of_robot())), (), 0, None)
     found: Any = SimpleNamespace(subdivision=told, setup=scenes.setting("gough_stewart", ("1", "3", "5")))
-    assert "leg 2 or 4 or 6 is stretched or has length zero, or an observed direction is" in _complete(found)[0]
+    assert (
+        "leg 2 or 4 or 6 is stretched or has length zero, or an observed direction is"
+        in _describe_completeness(found)[0]
+    )
 
 
 def test_a_zero_may_be_another_than_that_of_a_box() -> None:
@@ -277,7 +280,7 @@ def test_a_zero_may_be_another_than_that_of_a_box() -> None:
 def test_other_watched_legs_are_refused() -> None:
     """Four rods that slide, or three whose desired directions lie in a plane."""
     at = scenes.goal("gough_stewart")
-    with pytest.raises(NotEnclosed, match="not three sliding rods"):
+    with pytest.raises(EnclosureFailure, match="not three sliding rods"):
         SpringError.about(PoseError.of(scenes.setting("gough_stewart", ("1", "2", "3", "5")), at))
     error = of_robot()
     first = error.limbs[error.seen[0].limb]
@@ -285,7 +288,7 @@ def test_other_watched_legs_are_refused() -> None:
         replace(limb, centre=first.centre, tip=first.tip) if i == error.seen[1].limb else limb
         for i, limb in enumerate(error.limbs)
     ]
-    with pytest.raises(NotEnclosed, match="plane"):
+    with pytest.raises(EnclosureFailure, match="plane"):
         SpringError.about(replace(error, limbs=tuple(same)))
 
 
@@ -295,7 +298,7 @@ def test_no_other_rest_is_met_by_hand() -> None:
     at right angles to the desired one; Newton's method meets no other."""
     error = of_robot()
     found = cover(scenes.setting("gough_stewart", LEGS), scenes.goal("gough_stewart"), budget=80_000_000)
-    assert found.complete
+    assert found.is_complete
     assert not found.locked
     for p, R in met_by_hand(error, np.random.default_rng(4), STARTS):
         far = max(1.0, float(np.abs(p).max()))

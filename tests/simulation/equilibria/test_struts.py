@@ -14,7 +14,7 @@ from hrsynth.simulation.equilibria.equilibria import EquilibriumSearch
 from hrsynth.simulation.equilibria.exhaustive_search import cover
 from hrsynth.simulation.equilibria.pose_error import PoseError
 from hrsynth.simulation.equilibria.subdivision import Subdivision
-from hrsynth.simulation.equilibria.upu_legs import Struts, coincide, meetings, parallel
+from hrsynth.simulation.equilibria.upu_legs import Struts, has_coincident_lines, meetings, parallel
 from simulation import scenes
 from strategies import random_rotation
 
@@ -265,11 +265,11 @@ def test_lines_on_which_legs_lock_meet_in_points_or_are_one():
         through = [(centre + rng.normal() * axis, axis) for axis in R]
         (met,) = meetings(through)
         assert np.abs(met - centre).max() < 1e-12
-        assert not coincide(through)
+        assert not has_coincident_lines(through)
         apart = [(p + 0.3 * k * R[(k + 1) % 3], axis) for k, (p, axis) in enumerate(through)]
         assert len(meetings(apart[:2])) == 0
         point, axis = through[0]
         beside = [(point, axis), (point + rng.normal() * axis, -axis)]
-        assert coincide([*through, *beside[1:]])
+        assert has_coincident_lines([*through, *beside[1:]])
         assert meetings(beside) == []
-        assert not coincide([beside[0], (beside[1][0] + 0.1 * R[1], axis)])
+        assert not has_coincident_lines([beside[0], (beside[1][0] + 0.1 * R[1], axis)])

@@ -7,27 +7,27 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
-from ...budgets import LARGEST_FIELD, LARGEST_SWEEP
+from ...budgets import ERROR_FIELD_CELLS_MAX, ERROR_SWEEP_CELLS_MAX
 from ...errors import BadRequest
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
-from ...mechanism.pose import AskedPose, Grid, PoseLike, as_pose, asked_poses
+from ...mechanism.pose import AskedPose, Grid, PoseLike, convert_to_pose, parse_poses
 from ...options import option
 from ...progress import report
 from ...records import DEG, FLAT, As, Shown, recorded
 from ...results import Result
-from ...tolerances import LARGEST_FIRST_ORDER
+from ...tolerances import FIRST_ORDER_POSE_ERROR_MAX
 from ..analysis_declaration import analysis
 from ..observed import POSES, UNLIMITED, CameraLike, LegsLike, NoiseLike, ObservedRobot, RobotLike, Seed, SeeLike
-from ..pose_requests import configurations_at
-from ..verdict import verdict_of
+from ..pose_requests import solve_configurations
+from ..verdict import compute_verdict
 from .error_map import ErrorMap, Mapper
-from .measurement_bounds import IN_SIGHT, Cones, MeasurementBounds, unseen
-from .nonlinear_check import NonlinearCheck, true_errors
-from .pose_errors import PoseErrors, error_maxima
+from .measurement_bounds import IN_SIGHT, Cones, MeasurementBounds, find_invisible
+from .nonlinear_check import NonlinearCheck, sample_true_errors
+from .pose_errors import PoseErrors, compute_error_maxima
 from .swept import SweptErrors, require_file, sweep_to
 
-WORST = 3
+LARGEST_ERROR_POSES_COUNT = 3
 """Poses of a grid, those of the largest errors, at which the linear law is checked by samples."""
 
 
@@ -81,7 +81,7 @@ class Accuracy(Result, shown_as="accuracy"):
 
     def headline(self) -> str:
         """The robot, and the largest errors at each pose or of the grid."""
-        limit = LARGEST_FIRST_ORDER * self.setup.all_samples.model.length
+        limit = FIRST_ORDER_POSE_ERROR_MAX * self.setup.all_samples.model.length
         worst = [
             (
                 f"{1e3 * each.position.largest:.3g} mm"
@@ -205,7 +205,7 @@ def accuracy(
     BadRequest
         For unknown names, invalid cones, unobserved platform dof (the error is infinite at every pose), or something
         observed behind its camera.
-    PoseNotReached, NoReachablePose
+    PoseReachFailure, NoReachablePose
         If a pose, or all of a grid, is not reached.
 
     Notes
@@ -218,7 +218,7 @@ def accuracy(
     >>> hrsynth.accuracy("3rrr_m1", cone="0.1deg", at="x=0,y=0,phi=0")
     <Accuracy: 3rrr_m1, observing 1, 2, 3: 0.414 mm at x=0,y=0,z=0,phi=0deg>
     """
-    wanted: list[AskedPose] = asked_poses(at)
+    wanted: list[AskedPose] = parse_poses(at)
     if plane is not None and grid is not None:
         raise BadRequest(f"--plane {plane}: cannot be combined with --grid {grid}", remedy="Omit one.")
     if steps is not None and plane is None:
@@ -235,11 +235,11 @@ def accuracy(
             raise BadRequest(
                 f"--samples {nonlinear}: cannot be combined with an array file", remedy="Use single poses (--at)."
             )
-    held = None if plane is None else as_pose(plane)
-    cells = None if grid is None else Grid.parse(grid, LARGEST_FIELD if into is None else LARGEST_SWEEP)
+    held = None if plane is None else convert_to_pose(plane)
+    cells = None if grid is None else Grid.parse(grid, ERROR_FIELD_CELLS_MAX if into is None else ERROR_SWEEP_CELLS_MAX)
     setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed).telling(wanted)
     blur = MeasurementBounds.of(cone, noise, setup.observed)
-    sees_all(setup)
+    require_full_observation(setup)
     mapper = Mapper(setup, blur)
     field = swept = None
     if held is not None:
@@ -249,39 +249,39 @@ def accuracy(
     elif cells is not None:
         field = mapper.over(cells, seed)
     if field is not None and nonlinear and not wanted:
-        wanted = [*field.worst(WORST)]
+        wanted = [*field.worst(LARGEST_ERROR_POSES_COUNT)]
     start, motion = setup.all_samples.start, setup.motion
-    configurations = configurations_at(setup, wanted)
+    configurations = solve_configurations(setup, wanted)
     if not configurations and field is None and swept is None:
         configurations = [start]
     report("errors")
-    poses = tuple(errors_at(setup, blur, each) for each in configurations)
+    poses = tuple(compute_errors_at(setup, blur, each) for each in configurations)
     true = tuple(
-        true_errors(each, mapper.observation_model, motion, blur, errors, nonlinear, seed) if nonlinear else None
+        sample_true_errors(each, mapper.observation_model, motion, blur, errors, nonlinear, seed) if nonlinear else None
         for each, errors in zip(configurations, poses, strict=True)
     )
     return Accuracy(setup, blur, poses, true, field, swept)
 
 
-def errors_at(setup: ObservedRobot, blur: MeasurementBounds, at: ClosedConfiguration) -> PoseErrors:
+def compute_errors_at(setup: ObservedRobot, blur: MeasurementBounds, at: ClosedConfiguration) -> PoseErrors:
     """Return the error maxima at a closed configuration; raises ``BadRequest`` if something observed is behind its
     camera."""
     motion, observation_model = setup.motion, setup.samples.observation_model
-    pose, lost = motion.pose(at.pose(motion.link)), unseen(at, observation_model)
+    pose, lost = motion.pose(at.pose(motion.link)), find_invisible(at, observation_model)
     if lost is not None:
         raise BadRequest(
             f"{setup.robot.name}: {lost.kind} {lost.leg} is not in front of its camera at {pose}", remedy=IN_SIGHT
         )
-    return error_maxima(at, observation_model, blur, pose)
+    return compute_error_maxima(at, observation_model, blur, pose)
 
 
-def sees_all(setup: ObservedRobot, otherwise: str = "the error is infinite at every pose, ") -> None:
+def require_full_observation(setup: ObservedRobot, otherwise: str = "the error is infinite at every pose, ") -> None:
     """Raise ``BadRequest`` unless all platform dof are observed; ``otherwise`` begins its message."""
-    verdict = verdict_of(setup, setup.labels, setup.samples)
+    verdict = compute_verdict(setup, setup.labels, setup.samples)
     if verdict.unobserved:
         what, cure = (
             ("the legs do", "legs")
-            if all(each.by_segment for each in setup.observed)
+            if all(each.is_segment_direction for each in setup.observed)
             else ("what is observed does", "observations")
         )
         raise BadRequest(

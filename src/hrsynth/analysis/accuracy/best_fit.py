@@ -15,19 +15,25 @@ from functools import cached_property
 
 import numpy as np
 
-from ...budgets import BEST_FIT_FIRST_STEP, BEST_FIT_SHORTEST_STEP, BEST_FIT_STEPS
-from ...errors import LoopsNotClosed
+from ...budgets import BEST_FIT_FIRST_STEP_FRACTION, BEST_FIT_SHORTEST_STEP, BEST_FIT_STEPS_MAX
+from ...errors import LoopClosureFailure
 from ...geometry.vectors import Array
 from ...kinematics.chart import TangentChart
 from ...kinematics.configuration import ClosedConfiguration, measure
-from ...kinematics.velocity_relation import ObservationModel, relation
-from ...tolerances import FLAT_CURVATURE, FOLLOWED, HESSIAN_CHANGE, HESSIAN_STEP, INVERTED
-from ..singularity_indices import interaction_matrix
+from ...kinematics.velocity_relation import ObservationModel, compute_relation
+from ...tolerances import (
+    FLAT_CURVATURE_FRACTION,
+    HESSIAN_CHANGE_MAX_FRACTION,
+    HESSIAN_DIFFERENCE_STEP_MAX,
+    HIDDEN_ROBOT_RESIDUAL_TOL,
+    PSEUDOINVERSE_CUTOFF_FRACTION,
+)
+from ..singularity_indices import compute_interaction_matrix
 
 FIT, ENDS, NOT_FOUND = "fit", "ends", "not found"
-CORRECTIONS = 8
+BEST_FIT_CORRECTIONS_MAX = 8
 """Newton steps within which a prediction is to be corrected."""
-AIMED = 0.35
+BEST_FIT_STEP_CHANGE_FRACTION = 0.35
 """The change at which the next step's length aims."""
 
 Values = Sequence[Array] | Array
@@ -60,10 +66,10 @@ class _Bowl:
 
     def errors(self, at: ClosedConfiguration, wanted: Values) -> tuple[Array, Array]:
         """All errors e at a configuration, and their rates J (rows, n) in y."""
-        u, rates = observed_values(at, self.observation_model)
+        u, rates = measure_values(at, self.observation_model)
         every = list(zip(self.observation_model.observations, u, wanted, strict=True))
         kernel, _ = at.kernel()
-        forth = kernel @ np.linalg.pinv(self.chart.slope(at.q) @ kernel, rcond=INVERTED)
+        forth = kernel @ np.linalg.pinv(self.chart.slope(at.q) @ kernel, rcond=PSEUDOINVERSE_CUTOFF_FRACTION)
         rows = np.vstack([o.error_slope(v, w) @ r for (o, v, w), r in zip(every, rates, strict=True)]) @ forth
         return np.concatenate([o.error(v, w) for o, v, w in every]), np.asarray(rows)
 
@@ -75,9 +81,9 @@ class _Bowl:
     def hessian(self, wanted: Values) -> Array:
         """∇²F (n, n) at y = 0, by central differences of ∇F."""
         columns = []
-        for step in HESSIAN_STEP * np.eye(self.chart.basis.shape[1]):
+        for step in HESSIAN_DIFFERENCE_STEP_MAX * np.eye(self.chart.basis.shape[1]):
             ahead, behind = (self.slope(self.chart.at(each, self.at.q), wanted) for each in (step, -step))
-            columns.append((ahead - behind) / (2 * HESSIAN_STEP))
+            columns.append((ahead - behind) / (2 * HESSIAN_DIFFERENCE_STEP_MAX))
         H = np.array(columns)
         return np.asarray((H + H.T) / 2)
 
@@ -87,52 +93,58 @@ class _Bowl:
         y, at, last = guess, self.chart.at(guess, self.at.q), float(np.linalg.norm(guess))
         J = self.errors(self.at, wanted)[1]
         rest = H - J.T @ J
-        for _ in range(CORRECTIONS):
+        for _ in range(BEST_FIT_CORRECTIONS_MAX):
             e, J = self.errors(at, wanted)
             step = np.linalg.solve(rest + J.T @ J, -(e @ J))
             size = float(np.linalg.norm(step))
-            if size <= FOLLOWED:
+            if size <= HIDDEN_ROBOT_RESIDUAL_TOL:
                 return at
-            if size > HESSIAN_CHANGE * last:
+            if size > HESSIAN_CHANGE_MAX_FRACTION * last:
                 return None
             y, last = y + step, size
             at = self.chart.at(y, at.q)
         return None
 
 
-def observed_values(at: ClosedConfiguration, observation_model: ObservationModel) -> tuple[list[Array], list[Array]]:
+def measure_values(at: ClosedConfiguration, observation_model: ObservationModel) -> tuple[list[Array], list[Array]]:
     """The value (size,) of each observation and its rates (size, nv)."""
     return measure(at.model, at.q, observation_model.reference, observation_model.observations)[2:]
 
 
-def weakest(at: ClosedConfiguration, observation_model: ObservationModel) -> float:
+def compute_smallest_value(at: ClosedConfiguration, observation_model: ObservationModel) -> float:
     """The smallest singular value of Mᵀ (characteristic lengths), infinite where Mᵀ does not exist."""
-    M = interaction_matrix(relation(at, observation_model))
+    M = compute_interaction_matrix(compute_relation(at, observation_model))
     return np.inf if M is None else float(np.linalg.svd(M, compute_uv=False)[-1])
 
 
-def best_fits(at: ClosedConfiguration, observation_model: ObservationModel, wanted: Wanted) -> Fit:
+def track_best_fits(at: ClosedConfiguration, observation_model: ObservationModel, wanted: Wanted) -> Fit:
     """The curve of best fits from a configuration whose directions are ``wanted(0)``, led to ``wanted(1)``."""
-    way, done, step = [at], 0.0, BEST_FIT_FIRST_STEP
+    way, done, step = [at], 0.0, BEST_FIT_FIRST_STEP_FRACTION
     bowl = _Bowl(at, observation_model)
     H = first = bowl.hessian(wanted(0.0))
-    if _least(H) <= 0:
-        return Fit((at,), 0.0, weakest(at, observation_model), NOT_FOUND)
-    for _ in range(BEST_FIT_STEPS):
+    if _find_least_curvature(H) <= 0:
+        return Fit((at,), 0.0, compute_smallest_value(at, observation_model), NOT_FOUND)
+    for _ in range(BEST_FIT_STEPS_MAX):
         if done == 1.0 or step < BEST_FIT_SHORTEST_STEP:
             break
         ahead = min(1.0, done + step)
-        found = _newton_step(bowl, H, wanted, ahead)
+        found = _take_newton_step(bowl, H, wanted, ahead)
         change = np.inf if found is None else _change(bowl, H, *found)
-        if found is not None and change <= HESSIAN_CHANGE:
+        if found is not None and change <= HESSIAN_CHANGE_MAX_FRACTION:
             (bowl, H), done = found, ahead
             way.append(bowl.at)
-        step *= float(np.clip(AIMED / max(change, 1e-12), 0.25, 2.0))
-    outcome = FIT if done == 1.0 else ENDS if _least(H) < FLAT_CURVATURE * _least(first) else NOT_FOUND
-    return Fit(tuple(way), done, min(weakest(each, observation_model) for each in way), outcome)
+        step *= float(np.clip(BEST_FIT_STEP_CHANGE_FRACTION / max(change, 1e-12), 0.25, 2.0))
+    outcome = (
+        FIT
+        if done == 1.0
+        else ENDS
+        if _find_least_curvature(H) < FLAT_CURVATURE_FRACTION * _find_least_curvature(first)
+        else NOT_FOUND
+    )
+    return Fit(tuple(way), done, min(compute_smallest_value(each, observation_model) for each in way), outcome)
 
 
-def _newton_step(bowl: _Bowl, H: Array, wanted: Wanted, ahead: float) -> tuple[_Bowl, Array] | None:
+def _take_newton_step(bowl: _Bowl, H: Array, wanted: Wanted, ahead: float) -> tuple[_Bowl, Array] | None:
     """The bowl around the best fit a step further, and its Hessian; None where Newton steps do not contract near the
     prediction."""
     try:
@@ -142,7 +154,7 @@ def _newton_step(bowl: _Bowl, H: Array, wanted: Wanted, ahead: float) -> tuple[_
             return None
         there = _Bowl(found, bowl.observation_model)
         return there, there.hessian(wanted(ahead))
-    except LoopsNotClosed:
+    except LoopClosureFailure:
         return None
 
 
@@ -150,12 +162,12 @@ def _change(bowl: _Bowl, H: Array, there: _Bowl, other: Array) -> float:
     """‖H^{-1/2} (H′ − H) H^{-T/2}‖, H′ the Hessian a step further in the same coordinates: where it stays below 1 all
     along, so does every Hessian definite."""
     across = there.chart.basis.T @ bowl.chart.basis
-    if across.shape[0] != across.shape[1] or _least(other) <= 0:
+    if across.shape[0] != across.shape[1] or _find_least_curvature(other) <= 0:
         return np.inf
     back = np.linalg.inv(np.linalg.cholesky(H))
     return float(np.linalg.norm(back @ (across.T @ other @ across - H) @ back.T, 2))
 
 
-def _least(H: Array) -> float:
+def _find_least_curvature(H: Array) -> float:
     """The least curvature."""
     return float(np.linalg.eigvalsh(H)[0])

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...batch.engine import Batch, Evaluation
-from ...batch.grids import poses_over
-from ...batch.pose_continuation import grid_dependence, reach, sweep
-from ...budgets import LARGEST_GRID, POSES_FOR_NUMBA_ONCE
+from ...batch.grids import list_grid_poses
+from ...batch.pose_continuation import explain_grid_dependence, sweep, track_to_pose
+from ...budgets import GRID_CELLS_MAX, NUMBA_SINGLE_BATCH_POSES_MIN
 from ...errors import BadRequest, Disagreement, HrsynthError, NoReachablePose
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
@@ -22,17 +22,17 @@ from ...mechanism.pose import Grid, Pose
 from ...progress import report
 from ...records import DEG, FLAT, MM, As, Recorded, Table
 from ...results import Value
-from ...tolerances import SAME_RELATION, USUAL_ERROR
+from ...tolerances import CHECKED_ERROR_MAX_FRACTION, RELATION_ANGLE_TOL
 from ..observed import ObservedRobot
-from ..singularity.locus import frame_plane
+from ..singularity.locus import choose_plane_grid
 from ..singularity.rank_curve import PlaneOfPoses
-from .measurement_bounds import MeasurementBounds, unseen
-from .pose_errors import maxima, reading
+from .measurement_bounds import MeasurementBounds, find_invisible
+from .pose_errors import bound_pose_errors, compute_rates_and_twists
 
 Flags = NDArray[np.bool_]
-PART = 25_000
+ERROR_MAP_CHUNK_COUNT = 25_000
 """Poses, at least, that are evaluated between two signs of progress."""
-SPOTS = 10
+ERROR_MAP_CHECKED_POSES_COUNT = 10
 """Number of poses of a grid at which the batch is compared with Pinocchio."""
 FINE, COARSE = 201, 41
 """Poses a side of a plane by the batch, and one by one."""
@@ -125,7 +125,7 @@ class Mapper(Value):
         if not all(id(o) in defaults for o in self.setup.observed):
             return None
         batch = self.setup.batch
-        return batch if batch is not None and batch.complete and batch.coordinates.constant else None
+        return batch if batch is not None and batch.is_complete and batch.coordinates.has_constant_twists else None
 
     def plane(self, plane: Pose, steps: int | None) -> Grid:
         """Return the grid over the reachable part of a plane."""
@@ -133,26 +133,28 @@ class Mapper(Value):
 
         def met(first: ClosedConfiguration, coarse: Grid) -> Flags:
             if self.batch is not None:
-                X, possible = poses_over(motion, coarse, self.setup.robot.name, coarse.places())
+                X, possible = list_grid_poses(motion, coarse, self.setup.robot.name, coarse.places())
                 return possible & self.batch.evaluate(X).reached
             return np.array([at is not None for at in sweep(first, all_samples.observation_model, coarse, motion)])
 
         count = steps or (FINE if self.batch is not None else COARSE)
-        return frame_plane(all_samples.start, all_samples.observation_model, motion, plane, count, met)
+        return choose_plane_grid(all_samples.start, all_samples.observation_model, motion, plane, count, met)
 
-    def over(self, grid: Grid, seed: int, checked: int = SPOTS) -> ErrorMap:
+    def over(self, grid: Grid, seed: int, checked: int = ERROR_MAP_CHECKED_POSES_COUNT) -> ErrorMap:
         """The error maxima over a grid, by the batch ``checked`` at so many poses; raises ``NoReachablePose`` where no
         pose of it is reached, ``BadRequest`` where poses have to be found one by one and are too many for that."""
         name = self.setup.robot.name
-        if self.batch is None and grid.size > LARGEST_GRID:
+        if self.batch is None and grid.size > GRID_CELLS_MAX:
             raise BadRequest(
                 f"{name}: the poses of this robot are solved one by one; number of poses",
                 grid.size,
-                f"at most {LARGEST_GRID}",
+                f"at most {GRID_CELLS_MAX}",
             )
         seen = self._one_by_one(grid) if self.batch is None else self._together(grid)
         dependent = (
-            None if seen.reached.all() else (grid_dependence(self.setup.all_samples.start, self.setup.motion, grid))
+            None
+            if seen.reached.all()
+            else (explain_grid_dependence(self.setup.all_samples.start, self.setup.motion, grid))
         )
         if not seen.reached.any():
             raise NoReachablePose(name, f"the grid {grid}", f"none of {grid.size} is", dependent)
@@ -184,7 +186,12 @@ class Mapper(Value):
         gap."""
         reached, bounds = possible & part.reached, (part.position, part.orientation)
         largest = [np.where(reached, each.largest, np.nan) for each in bounds if each is not None]
-        return reached, largest[0], largest[1], max(_gap(each.largest, each.lower) for each in bounds if each)
+        return (
+            reached,
+            largest[0],
+            largest[1],
+            max(_compute_bound_gap(each.largest, each.lower) for each in bounds if each),
+        )
 
     def _determinant(self, grid: Grid) -> Array | None:
         """The determinant of the directions' rates by the batch."""
@@ -209,22 +216,22 @@ class Mapper(Value):
         """Return the poses of each part of a grid (or of other ``places`` of it) that the platform can have, with the
         results of the batch; in NumPy if they are too few for numba's start."""
         count = grid.size if places is None else len(places)
-        size = -(-count // max(1, count // PART))
-        compiled = self.uses_numba(count, cones)
+        size = -(-count // max(1, count // ERROR_MAP_CHUNK_COUNT))
+        compiled = self.may_use_numba(count, cones)
         for start in range(0, count, size):
             report("poses")
             here = grid.places(start, start + size) if places is None else places[start : start + size]
             yield self.part(grid, here, cones, compiled)
 
-    def uses_numba(self, count: int, cones: Array | None) -> bool:
+    def may_use_numba(self, count: int, cones: Array | None) -> bool:
         """Return True if so many poses are evaluated by numba."""
         assert self.batch is not None
-        return self.batch.uses_numba(count, self.setup.labels, cones, POSES_FOR_NUMBA_ONCE)
+        return self.batch.may_use_numba(count, self.setup.labels, cones, NUMBA_SINGLE_BATCH_POSES_MIN)
 
     def part(self, grid: Grid, places: Array, cones: Array | None, compiled: bool) -> tuple[Flags, Evaluation]:
         """Return the poses at some places of a grid that the platform can have, with the results of the batch."""
         assert self.batch is not None
-        X, possible = poses_over(self.setup.motion, grid, self.setup.robot.name, places)
+        X, possible = list_grid_poses(self.setup.motion, grid, self.setup.robot.name, places)
         return possible, self.batch.evaluate(X, self.setup.labels, cones, compiled=compiled)
 
     def _one_by_one(self, grid: Grid) -> ErrorField:
@@ -232,11 +239,11 @@ class Mapper(Value):
         found = sweep(all_samples.start, all_samples.observation_model, grid, self.setup.motion, self.setup.placer)
         table = np.full((5, len(found)), np.nan)
         for i, at in enumerate(found):
-            if at is not None and unseen(at, self.observation_model) is None:
+            if at is not None and find_invisible(at, self.observation_model) is None:
                 report("errors")
-                rates, twists = reading(at, self.observation_model)
-                table[:4, i] = maxima(at, self.observation_model, self.blur).ravel()
-                table[4, i] = _weakest(rates, twists, at.model.length)
+                rates, twists = compute_rates_and_twists(at, self.observation_model)
+                table[:4, i] = bound_pose_errors(at, self.observation_model, self.blur).ravel()
+                table[4, i] = _compute_smallest_change(rates, twists, at.model.length)
         plane = PlaneOfPoses(self.observation_model, self.setup.motion, grid)
         return ErrorField(
             np.isfinite(table[4]),
@@ -244,17 +251,24 @@ class Mapper(Value):
             table[1],
             lambda: None,
             lambda: table[4],
-            _gap(table[:2], table[2:4]),
+            _compute_bound_gap(table[:2], table[2:4]),
             partial(plane.curve, found) if grid.ndim == 2 else None,
         )
 
     def spots(
-        self, grid: Grid, seen: ErrorField, seed: int, count: int = SPOTS, cells: NDArray[np.int64] | None = None
+        self,
+        grid: Grid,
+        seen: ErrorField,
+        seed: int,
+        count: int = ERROR_MAP_CHECKED_POSES_COUNT,
+        cells: NDArray[np.int64] | None = None,
     ) -> SpotChecks:
         """Compare the batch with Pinocchio at random poses of those that are ``seen``, all of a grid or those at some
         ``cells``; raises ``Disagreement``."""
         sizes = [np.where(np.isfinite(each), each, 0.0) for each in (seen.position, seen.orientation)]
-        limits = [USUAL_ERROR * np.median(each[each > 0]) if (each > 0).any() else np.inf for each in sizes]
+        limits = [
+            CHECKED_ERROR_MAX_FRACTION * np.median(each[each > 0]) if (each > 0).any() else np.inf for each in sizes
+        ]
         finite = np.isfinite(seen.position) & np.isfinite(seen.orientation)
         usual = np.flatnonzero(seen.reached & finite & (sizes[0] <= limits[0]) & (sizes[1] <= limits[1]))
         chosen = np.random.default_rng(seed).choice(usual, min(count, len(usual)), replace=False)
@@ -266,27 +280,27 @@ class Mapper(Value):
             met += 1
             for mine, theirs, all_of in zip(
                 (seen.position[i], seen.orientation[i]),
-                maxima(at, self.observation_model, self.blur)[0],
+                bound_pose_errors(at, self.observation_model, self.blur)[0],
                 sizes,
                 strict=True,
             ):
                 scale = max(mine, float(np.median(all_of[all_of > 0])) if (all_of > 0).any() else 1.0)
                 largest = max(largest, abs(mine - theirs) / scale)
-        if largest > SAME_RELATION + seen.gap:
+        if largest > RELATION_ANGLE_TOL + seen.gap:
             raise Disagreement(self.setup.robot.name, met, largest)
         return SpotChecks(met, float(largest))
 
     def _configurations(self, grid: Grid, chosen: NDArray[np.int64]) -> list[ClosedConfiguration | None]:
         """The closed configurations at cells of a grid."""
         setup = self.setup
-        X, _ = poses_over(setup.motion, grid, setup.robot.name, grid.places_at(chosen))
+        X, _ = list_grid_poses(setup.motion, grid, setup.robot.name, grid.places_at(chosen))
         if setup.placer is not None:
             return setup.placer.configurations(X)
         found: list[ClosedConfiguration | None] = []
         for each in X:
             try:
                 found.append(
-                    reach(
+                    track_to_pose(
                         setup.all_samples.start,
                         setup.all_samples.observation_model,
                         setup.motion.pose(each),
@@ -298,16 +312,16 @@ class Mapper(Value):
         return found
 
 
-def _gap(largest: Array, lower: Array) -> float:
+def _compute_bound_gap(largest: Array, lower: Array) -> float:
     """The largest gap between the bounds, as a part of the lower ones."""
     here = np.isfinite(largest) & (lower > 0)
     return float(np.max((largest[here] - lower[here]) / lower[here], initial=0.0))
 
 
-def _weakest(rates: Array, twists: Array, length: float) -> float:
+def _compute_smallest_change(rates: Array, twists: Array, length: float) -> float:
     """The smallest change of the directions for a unit twist (characteristic lengths, radians)."""
     scaled = twists / np.repeat([length, 1.0], 3)[:, None]
     _, values, right = np.linalg.svd(scaled, full_matrices=False)
-    kept = values > SAME_RELATION
+    kept = values > RELATION_ANGLE_TOL
     M = rates @ right[kept].T / values[kept]
     return float(np.linalg.svd(M, compute_uv=False)[-1]) if M.shape[0] >= M.shape[1] else 0.0

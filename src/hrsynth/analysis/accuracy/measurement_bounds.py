@@ -15,15 +15,15 @@ from typing import Any
 import numpy as np
 
 from ...errors import BadRequest
-from ...geometry.vectors import Array, rotation_about
+from ...geometry.vectors import Array, rotate_about_axis
 from ...kinematics.configuration import ClosedConfiguration, measure
 from ...kinematics.velocity_relation import ObservationModel
 from ...mechanism import Observation
-from ...mechanism.noise import Noise, blurs
+from ...mechanism.noise import Noise, compute_noise_rates
 from ...mechanism.observations.direction import SeenAxis
-from ...options import plain_number
+from ...options import parse_plain_number
 from ...results import Value
-from ...tolerances import NARROWEST_CONE, SEEN_ABOVE
+from ...tolerances import CONE_HALF_ANGLE_MIN_RAD, VISIBLE_SINE_MIN
 
 ANGLES = "0.1deg, 0.002 (radians)"
 EXAMPLE = f"{ANGLES}, or one for each leg such as 1=0.1deg,2=0.2deg"
@@ -33,13 +33,13 @@ Cones = float | str | Mapping[str, float | str] | Mapping[int, float | str]
 """One half-angle (rad) for all observed directions, one for each leg or link, or either as text."""
 
 
-def half_angles(cones: Cones, observed: Sequence[Observation]) -> Array:
+def list_half_angles(cones: Cones, observed: Sequence[Observation]) -> Array:
     """The half-angle (rad) of each observation's cone, (k,); raises ``BadRequest`` where one is missing, is of nothing
     that is observed, or is not between 0 and 90 degrees."""
     given = _parse(cones) if isinstance(cones, str) else cones
     if not isinstance(given, Mapping):
         return np.full(len(observed), _require_angle(given, given))
-    given = {str(name): _angle(value) if isinstance(value, str) else value for name, value in given.items()}
+    given = {str(name): _parse_angle(value) if isinstance(value, str) else value for name, value in given.items()}
     names = {name for o in observed for name in (o.leg, o.link)}
     unknown = [name for name in given if name not in names]
     if unknown:
@@ -60,7 +60,7 @@ def half_angles(cones: Cones, observed: Sequence[Observation]) -> Array:
 def _parse(text: str) -> float | dict[str, float]:
     fields = [field.strip() for field in text.split(",")]
     if len(fields) == 1 and "=" not in fields[0]:
-        return _angle(fields[0])
+        return _parse_angle(fields[0])
     found: dict[str, float] = {}
     for field in fields:
         name, equals, value = (piece.strip() for piece in field.partition("="))
@@ -68,19 +68,19 @@ def _parse(text: str) -> float | dict[str, float]:
             raise BadRequest(f"--cone {field}: not of the form LEG=ANGLE", remedy=f"Use {EXAMPLE}.")
         if name in found:
             raise BadRequest(f"--cone: leg {name} is given twice", remedy="Omit one.")
-        found[name] = _angle(value)
+        found[name] = _parse_angle(value)
     return found
 
 
-def single_angle(cone: float | str) -> float:
+def require_single_angle(cone: float | str) -> float:
     """Return one half-angle (rad) for all observations; raises ``BadRequest``."""
-    return _angle(cone, ANGLES) if isinstance(cone, str) else _require_angle(cone, cone)
+    return _parse_angle(cone, ANGLES) if isinstance(cone, str) else _require_angle(cone, cone)
 
 
-def _angle(text: str, allowed: str = EXAMPLE) -> float:
+def _parse_angle(text: str, allowed: str = EXAMPLE) -> float:
     digits = text.removesuffix("deg").strip()
     try:
-        value = plain_number(digits)
+        value = parse_plain_number(digits)
     except ValueError:
         raise BadRequest("--cone: angle", text, allowed) from None
     return _require_angle(value if digits == text else math.radians(value), text)
@@ -89,8 +89,8 @@ def _angle(text: str, allowed: str = EXAMPLE) -> float:
 def _require_angle(value: Any, shown: object) -> float:
     if isinstance(value, bool) or not (isinstance(value, Real) and 0 < float(value) < math.pi / 2):
         raise BadRequest("--cone: half-angle", shown, ALLOWED)
-    if value < NARROWEST_CONE:
-        raise BadRequest("--cone: half-angle", shown, f"at least {NARROWEST_CONE:g} (radians)")
+    if value < CONE_HALF_ANGLE_MIN_RAD:
+        raise BadRequest("--cone: half-angle", shown, f"at least {CONE_HALF_ANGLE_MIN_RAD:g} (radians)")
     return float(value)
 
 
@@ -142,7 +142,7 @@ class MeasurementBounds(Value):
         if amounts is not None:
             amounts.amounts_for(others if cone is not None else observed)
         angle = 0.0 if amounts is None else amounts.of("rad")
-        half = half_angles(cone, axes) if cone is not None else np.full(len(axes), angle)
+        half = list_half_angles(cone, axes) if cone is not None else np.full(len(axes), angle)
         found = np.zeros(len(observed))
         found[[i for i, o in enumerate(observed) if isinstance(o, SeenAxis)]] = half
         return cls(found, amounts if others else None)
@@ -202,7 +202,7 @@ class MeasurementBounds(Value):
             own = (
                 [self.cones[i] * np.eye(3)]
                 if isinstance(o, SeenAxis)
-                else [each / unit[:, None] for each in blurs(o, value * unit, self.own(i, o))]
+                else [each / unit[:, None] for each in compute_noise_rates(o, value * unit, self.own(i, o))]
             )
             for number, each in enumerate(own):
                 whole = np.zeros((ends[-1], 3))
@@ -232,18 +232,18 @@ class MeasurementBounds(Value):
             shocks[i, number] = part * each
         for i, (o, value) in enumerate(zip(observed, values, strict=True)):
             if isinstance(o, SeenAxis):
-                found[i] = tilt(value[None], shocks[i, :1])[0]
+                found[i] = rotate_directions(value[None], shocks[i, :1])[0]
             elif own := self.own(i, o):
                 unit = length ** np.broadcast_to(o.dimension, o.size)
                 found[i] = o.sense(value * unit, shocks[i], own) / unit
         return found
 
 
-def tilt(u: Sequence[Array] | Array, way: Array) -> Array:
+def rotate_directions(u: Sequence[Array] | Array, way: Array) -> Array:
     """u (k, 3), each turned by the angle ‖way‖ towards its way (k, 3), which is normal to it."""
     return np.array(
         [
-            rotation_about(np.cross(a, b), float(np.linalg.norm(b))) @ a if np.any(b) else a
+            rotate_about_axis(np.cross(a, b), float(np.linalg.norm(b))) @ a if np.any(b) else a
             for a, b in zip(u, way, strict=True)
         ]
     )
@@ -252,13 +252,13 @@ def tilt(u: Sequence[Array] | Array, way: Array) -> Array:
 IN_SIGHT = "Choose a pose at which everything observed is visible, or point the camera's z axis at it."
 
 
-def unseen(at: ClosedConfiguration, observation_model: ObservationModel) -> Observation | None:
+def find_invisible(at: ClosedConfiguration, observation_model: ObservationModel) -> Observation | None:
     """Return an observation that is not in front of its camera, or outside its image, at a configuration; else None."""
     return next(
         (
             o
             for o in observation_model.observations
-            if o.in_front(at.pose(o.seen_from or observation_model.reference), at.pose(o.link)) < SEEN_ABOVE
+            if o.in_front(at.pose(o.seen_from or observation_model.reference), at.pose(o.link)) < VISIBLE_SINE_MIN
         ),
         None,
     )

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import numpy as np
 
-from ...geometry.so3 import angle_of
+from ...geometry.so3 import compute_rotation_angle
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
@@ -19,7 +19,7 @@ from ...kinematics.velocity_relation import ObservationModel
 from ...progress import report
 from ...records import DEG, MM, As, Number
 from ...results import Value
-from .best_fit import ENDS, NOT_FOUND, best_fits, observed_values, weakest
+from .best_fit import ENDS, NOT_FOUND, compute_smallest_value, measure_values, track_best_fits
 from .measurement_bounds import MeasurementBounds
 from .pose_errors import PoseErrors
 
@@ -45,7 +45,7 @@ class NonlinearCheck(Value, all_recorded=True):
         return len(self.ended) + self.not_found
 
 
-def true_errors(
+def sample_true_errors(
     at: ClosedConfiguration,
     observation_model: ObservationModel,
     motion: PlatformMotion,
@@ -55,23 +55,23 @@ def true_errors(
     seed: int = 0,
 ) -> NonlinearCheck:
     """The true errors at a configuration for ``count`` samples, seeded."""
-    values, length = observed_values(at, observation_model)[0], at.model.length
+    values, length = measure_values(at, observation_model)[0], at.model.length
     balls = blur.at(at, observation_model)
-    ways = _extremes(linear)
+    ways = _list_extreme_errors(linear)
     rng = np.random.default_rng(seed)
     axes = np.array([values[i] if blur.cones[i] else np.zeros(3) for i, _ in balls.balls])
     radii = blur.radii(balls.balls)[:, None]
-    ways += [radii * _tangents(rng, axes) for _ in range(max(0, count - len(ways)))]
+    ways += [radii * _sample_tangents(rng, axes) for _ in range(max(0, count - len(ways)))]
 
     def wrong(way: Array, part: float) -> list[Array]:
         return blur.wrong(observation_model.observations, values, length, balls, way, part)
 
     home = at.pose(motion.link)
-    position, orientation, usual = 0.0, 0.0, weakest(at, observation_model)
+    position, orientation, usual = 0.0, 0.0, compute_smallest_value(at, observation_model)
     least, ended, not_found = usual, [], 0
     for way in ways:
         report("samples")
-        fit = best_fits(at, observation_model, partial(wrong, way))
+        fit = track_best_fits(at, observation_model, partial(wrong, way))
         least = min(least, fit.weakest)
         if fit.outcome == ENDS:
             ended.append(fit.reached)
@@ -80,17 +80,17 @@ def true_errors(
             X = there.pose(motion.link)
             position = max(position, float(np.linalg.norm(motion.position(X) - motion.position(home))))
             if motion.body:
-                orientation = max(orientation, angle_of(X[:3, :3] @ home[:3, :3].T))
+                orientation = max(orientation, compute_rotation_angle(X[:3, :3] @ home[:3, :3].T))
     return NonlinearCheck(len(ways), position, orientation, tuple(sorted(ended)), not_found, least, usual)
 
 
-def _extremes(linear: PoseErrors) -> list[Array]:
+def _list_extreme_errors(linear: PoseErrors) -> list[Array]:
     """The errors (k, 3) that are the worst to first order, of both signs."""
     found = [each.errors for each in (linear.position, linear.orientation) if each.errors is not None]
     return [sign * errors for errors in found for sign in (1.0, -1.0)]
 
 
-def _tangents(rng: np.random.Generator, u: Array) -> Array:
+def _sample_tangents(rng: np.random.Generator, u: Array) -> Array:
     """Random unit vectors (k, 3) normal to u (k, 3), of unit vectors or zero."""
     vectors = rng.normal(size=u.shape)
     vectors -= np.sum(vectors * u, axis=1, keepdims=True) * u

@@ -7,16 +7,16 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ...budgets import VALLEY_NARROWING, VALLEYS_ON_LINES, VALLEYS_ON_PLANE
+from ...budgets import LINE_VALLEYS_MAX, PLANE_VALLEYS_MAX, VALLEY_NARROWING_FRACTION
 from ...geometry.vectors import Array
-from ...tolerances import VALLEY_DEPTH, VALLEY_ZERO
+from ...tolerances import VALLEY_DEPTH_FRACTION, VALLEY_ZERO_FRACTION
 from .error_map import ErrorMap
 
-ROUNDS = 28
+SINGULAR_SEARCH_ROUNDS_COUNT = 28
 """Times the search is narrowed."""
 
 
-def singular_poses(field: ErrorMap) -> Array:
+def find_singular_poses(field: ErrorMap) -> Array:
     """Singular poses (n, 2) of a plane, as values of its two parts: along the lines of its cells, and isolated ones."""
     if field.smallest_at is None or field.grid.ndim != 2:
         return np.zeros((0, 2))
@@ -32,16 +32,16 @@ def singular_poses(field: ErrorMap) -> Array:
     steps = np.array([values[1] - values[0] for values in axes])
     found = [np.zeros((0, 2))]
     for across in ([0], [1], [0, 1]):
-        most = VALLEYS_ON_PLANE if len(across) == 2 else VALLEYS_ON_LINES
-        cells = _valleys(table, across, VALLEY_DEPTH * usual)[:most]
+        most = PLANE_VALLEYS_MAX if len(across) == 2 else LINE_VALLEYS_MAX
+        cells = _find_valleys(table, across, VALLEY_DEPTH_FRACTION * usual)[:most]
         if len(cells):
             start = np.stack([axes[k][cells[:, k]] for k in range(2)], axis=1)
-            places, depth = _deepest(value, start, steps, across)
-            found.append(places[depth <= VALLEY_ZERO * usual])
+            places, depth = _find_deepest(value, start, steps, across)
+            found.append(places[depth <= VALLEY_ZERO_FRACTION * usual])
     return np.concatenate(found)
 
 
-def _valleys(table: Array, across: list[int], limit: float) -> NDArray[np.int64]:
+def _find_valleys(table: Array, across: list[int], limit: float) -> NDArray[np.int64]:
     """Cells (n, 2) no higher than their neighbours along some axes, the deepest first."""
     padded = np.pad(table, 1, constant_values=np.inf)
     nx, ny = table.shape
@@ -56,17 +56,19 @@ def _valleys(table: Array, across: list[int], limit: float) -> NDArray[np.int64]
     return cells[np.argsort(table[tuple(cells.T)], kind="stable")]
 
 
-def _deepest(value: Callable[[Array], Array], start: Array, steps: Array, across: list[int]) -> tuple[Array, Array]:
+def _find_deepest(
+    value: Callable[[Array], Array], start: Array, steps: Array, across: list[int]
+) -> tuple[Array, Array]:
     """The lowest places (n, 2) around starts, along some axes, and the values there (n,)."""
     offsets = np.zeros((5 ** len(across), 2))
     grid = np.stack(np.meshgrid(*[np.linspace(-1, 1, 5)] * len(across), indexing="ij"), -1)
     offsets[:, across] = grid.reshape(-1, len(across))
     best, reach = start.copy(), steps.copy()
     depth = value(best)
-    for _ in range(ROUNDS):
+    for _ in range(SINGULAR_SEARCH_ROUNDS_COUNT):
         places = best[:, None] + offsets * reach
         found = value(places.reshape(-1, 2)).reshape(len(best), -1)
         chosen = np.argmin(found, axis=1)
         rows = np.arange(len(best))
-        best, depth, reach = places[rows, chosen], found[rows, chosen], VALLEY_NARROWING * reach
+        best, depth, reach = places[rows, chosen], found[rows, chosen], VALLEY_NARROWING_FRACTION * reach
     return best, depth

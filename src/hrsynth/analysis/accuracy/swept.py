@@ -16,17 +16,17 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...budgets import SWEEP_DRAWN, SWEEP_PART
-from ...description.files import as_path, open_kept, require_alone, require_writable, seal_line, unseal_line
-from ...errors import BadRequest, BuildStopped, NoReachablePose
+from ...budgets import ERROR_SWEEP_SAMPLES_COUNT, SWEEP_PART
+from ...description.files import add_checksum, convert_to_path, open_kept, require_alone, require_writable, unseal_line
+from ...errors import BadRequest, BuildInterruption, NoReachablePose
 from ...geometry.vectors import Array
 from ...mechanism.pose import Grid
 from ...progress import report
 from ...records import DEG, FLAT, MM, As, Shown, recorded
-from ...results import Value, content
-from ...tolerances import LARGEST_FIRST_ORDER
+from ...results import Value, freeze_content
+from ...tolerances import FIRST_ORDER_POSE_ERROR_MAX
 from ...version import __version__
-from .error_map import SPOTS, ErrorField, Mapper, SpotChecks
+from .error_map import ERROR_MAP_CHECKED_POSES_COUNT, ErrorField, Mapper, SpotChecks
 from .ranges import ErrorRange, Tally
 
 ENDING, PART, JOURNAL = ".npy", ".part", ".journal"
@@ -77,7 +77,7 @@ def sweep_to(path: str | Path, mapper: Mapper, grid: Grid, seed: int) -> SweptEr
     BadRequest
         For another suffix than .npy, poses that are solved one by one, a disk that is too small, or another sweep to
         that file, running or interrupted.
-    BuildStopped
+    BuildInterruption
         If the disk is full; what was written is kept.
     NoReachablePose
         If no pose of the grid is reached.
@@ -90,12 +90,12 @@ def sweep_to(path: str | Path, mapper: Mapper, grid: Grid, seed: int) -> SweptEr
     cones = mapper.blur.cones
     asked = hashlib.sha256(
         repr(
-            content((mapper.setup.mechanism, mapper.setup.observed, mapper.blur, grid, SWEEP_PART, __version__))
+            freeze_content((mapper.setup.mechanism, mapper.setup.observed, mapper.blur, grid, SWEEP_PART, __version__))
         ).encode()
     ).hexdigest()
-    with _SweepDraft(target, grid, asked, mapper.uses_numba(grid.size, cones)) as draft:
+    with _SweepDraft(target, grid, asked, mapper.may_use_numba(grid.size, cones)) as draft:
         tally = draft.tally
-        limits = [LARGEST_FIRST_ORDER * mapper.setup.all_samples.model.length, LARGEST_FIRST_ORDER]
+        limits = [FIRST_ORDER_POSE_ERROR_MAX * mapper.setup.all_samples.model.length, FIRST_ORDER_POSE_ERROR_MAX]
         for start in range(tally.done, grid.size, SWEEP_PART):
             places = grid.places(start, start + SWEEP_PART)
             reached, *errors, gap = mapper.errors(*mapper.part(grid, places, cones, draft.compiled))
@@ -107,22 +107,26 @@ def sweep_to(path: str | Path, mapper: Mapper, grid: Grid, seed: int) -> SweptEr
         if not tally.reached:
             draft.discard()
             raise NoReachablePose(name, f"the grid {grid}", f"none of {grid.size} is")
-        spots = _spots(mapper, grid, draft, tally, seed)
+        spots = _check_spots(mapper, grid, draft, tally, seed)
         before = draft.tally.done
         draft.finish()
     return SweptErrors(grid, Path(path), tally, spots, before)
 
 
-def _spots(mapper: Mapper, grid: Grid, draft: _SweepDraft, tally: Tally, seed: int) -> SpotChecks:
+def _check_spots(mapper: Mapper, grid: Grid, draft: _SweepDraft, tally: Tally, seed: int) -> SpotChecks:
     """Check the file against Pinocchio at random poses; if few of these are reached, at those of the part that is
     reached most."""
     rng = np.random.default_rng(seed)
     start = tally.fullest[1]
     for low, high in ((0, grid.size), (start, min(start + SWEEP_PART, grid.size))):
-        cells = np.arange(low, high) if high - low <= SWEEP_DRAWN else np.sort(rng.integers(low, high, SWEEP_DRAWN))
+        cells = (
+            np.arange(low, high)
+            if high - low <= ERROR_SWEEP_SAMPLES_COUNT
+            else np.sort(rng.integers(low, high, ERROR_SWEEP_SAMPLES_COUNT))
+        )
         rows = draft.rows(cells)
         reached = ~np.isnan(rows[:, 0])
-        if reached.sum() >= SPOTS:
+        if reached.sum() >= ERROR_MAP_CHECKED_POSES_COUNT:
             break
     position, orientation = rows.T
     seen = ErrorField(reached, position, orientation, lambda: None, lambda: position, tally.gap)
@@ -131,7 +135,7 @@ def _spots(mapper: Mapper, grid: Grid, draft: _SweepDraft, tally: Tally, seed: i
 
 def require_file(path: str | Path) -> Path:
     """Return the path of the file; raises ``BadRequest``."""
-    if as_path(path).suffix.lower() != ENDING:
+    if convert_to_path(path).suffix.lower() != ENDING:
         raise BadRequest("array of errors: name of the file", str(path), f"*{ENDING}")
     return require_writable(path)
 
@@ -149,7 +153,7 @@ class _SweepDraft:
         )
         self._head, self._whole = head.getvalue(), grid.size * ROW.itemsize
         self._files = ExitStack()
-        with _stopping(self.journal), ExitStack() as files:
+        with _stop_on_disk_error(self.journal), ExitStack() as files:
             self._lines = files.enter_context(open(open_kept(self.journal), "r+b"))
             require_alone(self._lines.fileno(), "another sweep writes this file", self.journal, "one sweep at a time")
             self.compiled, self.tally = self._resume(asked, compiled)
@@ -212,13 +216,13 @@ class _SweepDraft:
         return len(self._head) + done * ROW.itemsize
 
     def _line(self, text: str) -> None:
-        self._lines.write(seal_line(text).encode("ascii") + b"\n")
+        self._lines.write(add_checksum(text).encode("ascii") + b"\n")
         self._lines.flush()
         os.fsync(self._lines.fileno())
 
     def add(self, rows: Array, tally: Tally) -> None:
         """Write the next rows, and what they came to with all before them."""
-        with _stopping(self.journal):
+        with _stop_on_disk_error(self.journal):
             self._rows.seek(self._place(tally.done - len(rows)))
             self._rows.write(rows.tobytes())
             self._rows.flush()
@@ -244,9 +248,9 @@ class _SweepDraft:
 
 
 @contextmanager
-def _stopping(journal: Path) -> Iterator[None]:
-    """Raise ``BuildStopped`` where the disk refuses."""
+def _stop_on_disk_error(journal: Path) -> Iterator[None]:
+    """Raise ``BuildInterruption`` where the disk refuses."""
     try:
         yield
     except OSError as error:
-        raise BuildStopped(f"{error.filename or journal}: {error.strerror}", str(journal), "sweep") from None
+        raise BuildInterruption(f"{error.filename or journal}: {error.strerror}", str(journal), "sweep") from None

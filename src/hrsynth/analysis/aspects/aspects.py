@@ -13,21 +13,21 @@ from functools import cached_property
 from itertools import combinations, pairwise
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
-from ...budgets import ATLAS_INTERVALS
-from ...errors import PoseNotReached
+from ...budgets import ASPECTS_INTERVALS_MAX
+from ...errors import PoseReachFailure
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism.pose import ModeNumber, PoseLike
 from ...options import option
 from ...progress import report
 from ...records import FLAT, As, Recorded, Shown, recorded
 from ...results import Result, Value
-from ...tolerances import FOLLOWED
+from ...tolerances import HIDDEN_ROBOT_RESIDUAL_TOL
 from ..analysis_declaration import analysis
 from ..modes.modes import AssemblyModes, at_mode, modes
 from ..observed import CameraLike, LegsLike, RobotLike, Seed, SeeLike
-from .path import BUDGET, PathAnswer, PathPlanner
-from .singularity_slice import SingularitySlice, section
-from .three_cranks import CrankPlace, three_cranks
+from .path import PATH_INTERVALS_MAX, PathAnswer, PathPlanner
+from .singularity_slice import SingularitySlice, compute_singularity_slice
+from .three_cranks import CrankPlace, recognise_three_cranks
 from .vector_expressions import NoLegForm
 from .verdicts import SAME, SEPARATED, UNDECIDED
 
@@ -132,18 +132,18 @@ class AspectTable(Result, shown_as="aspects"):
         """Slice of poses with the direction of the first observed leg fixed, and the modes on it, by number; or the
         reason why there is none."""
         modes_at = {k: at for k, at in enumerate(self.places, 1) if at is not None}
-        found = three_cranks(self.aspects, list(modes_at.values())) if modes_at else "there is no mode"
+        found = recognise_three_cranks(self.aspects, list(modes_at.values())) if modes_at else "there is no mode"
         if isinstance(found, str):
             return found
         robot, places = found
         held = places[0].rods[0] / abs(places[0].rods[0])
-        return section(robot, complex(held)), dict(zip(modes_at, places, strict=True))
+        return compute_singularity_slice(robot, complex(held)), dict(zip(modes_at, places, strict=True))
 
     @property
     def changes(self) -> tuple[ModePair, ...]:
         """Pairs that show that the hidden robot is cuspidal: two modes, each proved to lie within the tube for which
         the path between them is certified."""
-        known = [mode.radius < FOLLOWED and (mode.proved or mode.goal) for mode in self.listed.modes]
+        known = [mode.radius < HIDDEN_ROBOT_RESIDUAL_TOL and (mode.proved or mode.goal) for mode in self.listed.modes]
         return tuple(
             pair
             for pair in self.pairs
@@ -181,7 +181,7 @@ def aspects(
         ),
     ] = None,
     seed: Seed = 0,
-    budget: int = BUDGET,
+    budget: int = PATH_INTERVALS_MAX,
 ) -> AspectTable:
     """Group assembly modes by aspect: which of them are joined by a path without Type 2 singularity.
 
@@ -204,7 +204,7 @@ def aspects(
 
     Raises
     ------
-    BadRequest, PoseNotReached, GeometryAmbiguous
+    BadRequest, PoseReachFailure, GeometryAmbiguous
         As for ``modes``.
 
     Notes
@@ -223,13 +223,13 @@ def aspects(
     answers: dict[tuple[int, int], PathAnswer] = {}
     spent = 0
     for one, other in _sort_pairs(aspects, places):
-        if spent >= ATLAS_INTERVALS or _chain(answers, one, other) is not None:
+        if spent >= ASPECTS_INTERVALS_MAX or _find_mode_chain(answers, one, other) is not None:
             continue
         start, goal = places[one - 1], places[other - 1]
         assert start is not None
         assert goal is not None
         report("paths")
-        answers[one, other] = aspects.join(start, goal, seed=seed, budget=min(budget, ATLAS_INTERVALS - spent))
+        answers[one, other] = aspects.join(start, goal, seed=seed, budget=min(budget, ASPECTS_INTERVALS_MAX - spent))
         spent += answers[one, other].boxes
     return AspectTable(
         aspects,
@@ -242,7 +242,7 @@ def aspects(
 def _place(listed: AssemblyModes, number: int) -> ClosedConfiguration | None:
     try:
         return at_mode(listed, ModeNumber(number))
-    except PoseNotReached:
+    except PoseReachFailure:
         return None
 
 
@@ -261,7 +261,7 @@ def _sort_pairs(aspects: PathPlanner, places: Sequence[ClosedConfiguration | Non
     )
 
 
-def _chain(answers: dict[tuple[int, int], PathAnswer], one: int, other: int) -> tuple[str, list[int]] | None:
+def _find_mode_chain(answers: dict[tuple[int, int], PathAnswer], one: int, other: int) -> tuple[str, list[int]] | None:
     """Return what known verdicts imply for two modes, and the modes over which: a chain of pairs in one aspect, at most
     one of which is separated instead (None if they imply nothing)."""
     import networkx as nx
@@ -288,7 +288,7 @@ def _pair(
     answer = answers.get(numbers)
     if answer is not None and answer.verdict != UNDECIDED:
         return ModePair(numbers, answer.verdict, answer.certified, answer.reason, (), answer)
-    found = _chain(answers, *numbers)
+    found = _find_mode_chain(answers, *numbers)
     if found is not None:
         verdict, way = found
         certified = all(answers[min(step), max(step)].certified for step in pairwise(way))

@@ -10,13 +10,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...budgets import FINEST_INTERVAL, FIRST_INTERVALS
-from ...constraints.condition import Named, rows
-from ...geometry.balls import Field, above_zero, balls, below, finite, jets, mean_value_form
+from ...budgets import FINEST_INTERVAL, PATH_FIRST_INTERVALS_COUNT
+from ...constraints.condition import NamedCondition, compute_leg_rows
+from ...geometry.balls import (
+    Field,
+    bound_norm_below,
+    check_finite,
+    check_positive,
+    enclose_intervals,
+    evaluate_mean_value_form,
+    make_ball_jets,
+)
 from ...geometry.vectors import Array, cross, dot, triple
 from .leg_forms import LegForms
 from .path_segments import StraightSegment, WorkingModeChange
-from .vector_expressions import limbs_of
+from .vector_expressions import collect_subchains
 
 PathSegment = StraightSegment | WorkingModeChange
 Leading = tuple[int, Field] | None
@@ -27,13 +35,13 @@ class ConditionEnclosure:
     """Value of the condition at poses: of a signed condition its expression, else the smallest singular value of its
     rows (of balls, a lower bound of it)."""
 
-    condition: Named
+    condition: NamedCondition
     forms: LegForms
 
     @property
-    def signed(self) -> bool:
+    def has_sign(self) -> bool:
         """True if the value has a sign."""
-        return sign_of(self.condition)
+        return has_sign_change(self.condition)
 
     @property
     def unlimited(self) -> ConditionEnclosure:
@@ -50,37 +58,42 @@ class ConditionEnclosure:
     def at(self, p: Field, R: Field, leading: Leading = None) -> tuple[NDArray[np.bool_], Field]:
         """Return whether all legs reach, (n,), and the value, (n,), at poses (n, 3), (n, 3, 3); NaN or not a number
         where they do not; ``leading`` as for :meth:`LegForms.at`."""
-        if self.signed:
+        if self.has_sign:
             reach_margins, value = self.raw(p, R, leading)
-            return np.asarray(above_zero(reach_margins).all(axis=1)), value
+            return np.asarray(check_positive(reach_margins).all(axis=1)), value
         found = self.forms.at(p, R, leading)
-        reached = np.asarray(above_zero(found.reach_margins).all(axis=1))
+        reached = np.asarray(check_positive(found.reach_margins).all(axis=1))
         if p.dtype == object:
             return reached, np.array(
                 [
-                    _weakest({name: value[i : i + 1] for name, value in found.values.items()}, self.condition)
+                    _bound_smallest_value(
+                        {name: value[i : i + 1] for name, value in found.values.items()}, self.condition
+                    )
                     if reached[i]
                     else 0.0
                     for i in range(len(p))
                 ]
             )
         values = np.full(len(p), np.nan)
-        blocks = rows(self.condition.pattern, found.values)
+        blocks = compute_leg_rows(self.condition.pattern, found.values)
         values[reached] = np.linalg.svd(blocks[reached], compute_uv=False)[:, -1]
         return reached, values
 
     def bounds(self, way: PathSegment, low: Array, high: Array) -> Array:
         """Return lower bounds of |value| on intervals of a segment, (n,); 0 where reach or value is not proved. Where a
         value contains zero its mean value form is tried, which is sharper on short intervals."""
-        boxes = balls(low, high)
+        boxes = enclose_intervals(low, high)
         sure, value = self.at(*way.at(boxes))
-        found = np.where(sure, below(value), 0.0)
-        weak = sure & (found == 0) & finite(value)
-        if not self.signed or not weak.any():
+        found = np.where(sure, bound_norm_below(value), 0.0)
+        weak = sure & (found == 0) & check_finite(value)
+        if not self.has_sign or not weak.any():
             return found
         middle = (low[weak] + high[weak]) / 2
-        middles, moving = self.raw(*way.at(balls(middle, middle))), self.raw(*way.at(jets(boxes[weak])))
-        found[weak] = below(mean_value_form(middles[1], moving[1], boxes[weak] - middle))
+        middles, moving = (
+            self.raw(*way.at(enclose_intervals(middle, middle))),
+            self.raw(*way.at(make_ball_jets(boxes[weak]))),
+        )
+        found[weak] = bound_norm_below(evaluate_mean_value_form(middles[1], moving[1], boxes[weak] - middle))
         return found
 
 
@@ -94,7 +107,7 @@ def _compile(expression: Any) -> tuple[list[str], Callable[..., Any]]:
     return names, sympy.lambdify([sympy.Symbol(name) for name in names], expression, modules=[products])
 
 
-def sign_of(condition: Named) -> bool:
+def has_sign_change(condition: NamedCondition) -> bool:
     """Return True if a condition's expression is one in vectors and changes its sign across the locus."""
     import sympy
 
@@ -116,7 +129,7 @@ def prove(enclosure: ConditionEnclosure, way: PathSegment, budget: int) -> Proof
 
     Stops as soon as a midpoint is out of reach or on the other side, or an interval is too short.
     """
-    ends = np.linspace(0, 1, FIRST_INTERVALS + 1)
+    ends = np.linspace(0, 1, PATH_FIRST_INTERVALS_COUNT + 1)
     low, high = ends[:-1], ends[1:]
     side, margin, boxes = 0.0, np.inf, 0
     while len(low):
@@ -141,9 +154,9 @@ def enclose_value(enclosure: ConditionEnclosure, p: Array, R: Array) -> tuple[bo
     """Return whether all poses within ``tolerances.FOLLOWED`` of one are reached, and a bound of the value with its
     sign: the value among them that is nearest to zero (0 if zero is among them)."""
     here = StraightSegment(p, R, np.zeros(3), np.zeros(3))
-    reached, values = enclosure.at(*here.at(balls([0.0], [0.0])))
+    reached, values = enclosure.at(*here.at(enclose_intervals([0.0], [0.0])))
     _, middle = enclosure.at(*here.at(np.zeros(1)))
-    return bool(reached[0]), float(np.sign(middle[0]) * below(values)[0])
+    return bool(reached[0]), float(np.sign(middle[0]) * bound_norm_below(values)[0])
 
 
 def is_beyond(enclosure: ConditionEnclosure, p: Array, R: Array) -> bool:
@@ -151,18 +164,20 @@ def is_beyond(enclosure: ConditionEnclosure, p: Array, R: Array) -> bool:
     the condition does not contain. Only joints whose coordinate follows from the pose and the other subchains are
     tested."""
     forms = enclosure.forms
-    known = limbs_of(tuple(forms.vectors.values()))
-    forms = replace(forms, bounds=tuple(bound for bound in forms.bounds if limbs_of(bound) <= known))
-    margins = forms.at(*StraightSegment(p, R, np.zeros(3), np.zeros(3)).at(balls([0.0], [0.0]))).reach_margins
-    return bool(above_zero(-margins[:, len(forms.subchains) :]).any())
+    known = collect_subchains(tuple(forms.vectors.values()))
+    forms = replace(forms, bounds=tuple(bound for bound in forms.bounds if collect_subchains(bound) <= known))
+    margins = forms.at(
+        *StraightSegment(p, R, np.zeros(3), np.zeros(3)).at(enclose_intervals([0.0], [0.0]))
+    ).reach_margins
+    return bool(check_positive(-margins[:, len(forms.subchains) :]).any())
 
 
-def _weakest(values: dict[str, Field], condition: Named) -> float:
+def _bound_smallest_value(values: dict[str, Field], condition: NamedCondition) -> float:
     """Return a lower bound of the smallest singular value of rows A of balls, (d columns): with B a pseudo-inverse of
     their midpoints, σ ≥ (1 − |I − B A|) / |B|."""
     from flint import arb_mat
 
-    A = rows(condition.pattern, values)[0]
+    A = compute_leg_rows(condition.pattern, values)[0]
     count, size = A.shape
     middle = np.array([float(getattr(x, "mid", lambda x=x: x)()) for x in A.flat]).reshape(A.shape)
     if not np.all(np.isfinite(middle)):
@@ -170,11 +185,13 @@ def _weakest(values: dict[str, Field], condition: Named) -> float:
     B = np.linalg.pinv(middle)
     inverse = arb_mat(size, count, B.ravel().tolist())
     product = inverse * arb_mat(count, size, A.ravel().tolist())
-    bound = (1 - _frobenius(product - arb_mat(size, size, np.eye(size).ravel().tolist()))) / _frobenius(inverse)
+    bound = (
+        1 - _enclose_frobenius_norm(product - arb_mat(size, size, np.eye(size).ravel().tolist()))
+    ) / _enclose_frobenius_norm(inverse)
     return float(np.nextafter(float(bound.lower()), 0.0)) if bound > 0 else 0.0
 
 
-def _frobenius(matrix: Any) -> Any:
+def _enclose_frobenius_norm(matrix: Any) -> Any:
     """Return an enclosure of the largest Frobenius norm of the matrices in one of balls."""
     entries = [x.abs_upper() for x in matrix.entries()]
     return sum((x * x for x in entries[1:]), start=entries[0] * entries[0]).sqrt()

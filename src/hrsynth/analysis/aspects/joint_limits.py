@@ -8,12 +8,12 @@ from itertools import combinations, product
 
 import numpy as np
 
-from ...constraints.named_vectors import axis_of
+from ...constraints.named_vectors import make_axis
 from ...geometry.balls import Field
 from ...geometry.so3 import wrap_angle
 from ...geometry.vectors import Array, cross, dot
 from ...mechanism import Joint, JointType
-from ...tolerances import FOLLOWED, SAME_RELATION, TURNING_ARM
+from ...tolerances import HIDDEN_ROBOT_RESIDUAL_TOL, RELATION_ANGLE_TOL, ROTATION_LEVER_MIN_FRACTION
 from .sampled_mechanism import SampledMechanism
 from .vector_expressions import NoLegForm, VectorExpression
 
@@ -49,7 +49,7 @@ class TurnLimit:
         """size (cos(angle − middle) − cos half), (n,)."""
         cosine, sine = _turn_between(self.one.value(of), self.two.value(of), of(self.axis))
         along = cosine * float(np.cos(self.middle)) + sine * float(np.sin(self.middle))
-        return np.asarray(along - self.size * (float(np.cos(self.half)) + FOLLOWED))
+        return np.asarray(along - self.size * (float(np.cos(self.half)) + HIDDEN_ROBOT_RESIDUAL_TOL))
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,7 @@ class SlideLimit:
 JointLimit = TurnLimit | SlideLimit
 
 
-def bounds(sight: SampledMechanism, source: Callable[..., VectorExpression]) -> Iterator[JointLimit]:
+def list_joint_limits(sight: SampledMechanism, source: Callable[..., VectorExpression]) -> Iterator[JointLimit]:
     """Yield the limits of joints whose coordinate follows from the pose."""
     for name, (lower, upper) in sight.mechanism.joint_ranges.items():
         if not -np.inf < lower < upper < np.inf:
@@ -92,14 +92,14 @@ def _bound(
         return None
     coordinates = np.array([model.difference(model.q0, at.q)[place] for at in sight.configurations])
     known = _Known(sight, source)
-    axis = known.source(axis_of(sight.mechanism, joint, "a"))
+    axis = known.source(make_axis(sight.mechanism, joint, "a"))
     if axis is None:
         return None
-    along = sight.values(axis_of(sight.mechanism, joint, "a"))
+    along = sight.values(make_axis(sight.mechanism, joint, "a"))
     if joint.type is JointType.PRISMATIC:
         for (one, start), (two, end) in product(known.points(joint.predecessor), known.points(joint.successor)):
             offsets = np.einsum("ij,ij->i", two - one, along) - coordinates
-            if np.ptp(offsets) < SAME_RELATION:
+            if np.ptp(offsets) < RELATION_ANGLE_TOL:
                 length = sight.coordinates.length
                 shift = middle / length + float(offsets[0])
                 return SlideLimit(joint.name, axis, LinkVector(end, start), shift, half / length)
@@ -109,7 +109,10 @@ def _bound(
             offsets = [wrap_angle(float(x)) for x in np.arctan2(sine, cosine) - coordinates]
             size = np.hypot(cosine, sine)
             apart = [wrap_angle(x - offsets[0]) for x in offsets]
-            if np.max(np.abs(apart)) < SAME_RELATION and np.ptp(size) < FOLLOWED < TURNING_ARM**2 < size[0]:
+            if (
+                np.max(np.abs(apart)) < RELATION_ANGLE_TOL
+                and np.ptp(size) < HIDDEN_ROBOT_RESIDUAL_TOL < ROTATION_LEVER_MIN_FRACTION**2 < size[0]
+            ):
                 return TurnLimit(joint.name, axis, first, second, middle + offsets[0], half, float(size[0]))
     return None
 
@@ -136,7 +139,7 @@ class _Known:
             yield two - one, LinkVector(end, start)
         for joint in self.sight.mechanism.joints_of(link):
             if joint.type is JointType.PRISMATIC:
-                axis = axis_of(self.sight.mechanism, joint, "p")
+                axis = make_axis(self.sight.mechanism, joint, "p")
                 found = self.source(axis)
                 if found is not None:
                     yield self.sight.values(axis), LinkVector(found)

@@ -12,16 +12,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...closed_forms.legs import ClosedFormLeg
-from ...constraints.named_vectors import BodyPoint, NamedVector, poses_at
+from ...constraints.named_vectors import BodyPoint, NamedVector, collect_poses
 from ...geometry.balls import Field
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism.legs import LegDecomposition
-from ...tolerances import SAME_RELATION
-from .joint_limits import JointLimit, bounds
+from ...tolerances import RELATION_ANGLE_TOL
+from .joint_limits import JointLimit, list_joint_limits
 from .path_segments import PathCoordinates
 from .sampled_mechanism import SampledMechanism
-from .vector_expressions import JointRules, NoLegForm, VectorExpression, value_of
+from .vector_expressions import JointRules, NoLegForm, VectorExpression, evaluate_expression
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +70,10 @@ class LegForms:
                 for number, limb in enumerate(self.subchains)
             ]
             carried = [vector for _, vector in solved]
-            values = {symbol: value_of(each, p, R, carried) for symbol, each in self.vectors.items()}
-            within = [bound.reach_margin(lambda each: value_of(each, p, R, carried)) for bound in self.bounds]
+            values = {symbol: evaluate_expression(each, p, R, carried) for symbol, each in self.vectors.items()}
+            within = [
+                bound.reach_margin(lambda each: evaluate_expression(each, p, R, carried)) for bound in self.bounds
+            ]
         values.update({symbol: values[symbol] - values[self.points[0]] for symbol in self.points[::-1]})
         free = [0 * p[:, 0] + 1.0] * (not solved and not within)
         return LegStates(np.stack([*(margin for margin, _ in solved), *within, *free], axis=1), values)
@@ -106,15 +108,15 @@ class LegPattern:
         limbs = []
         for limb, feature in zip(self.subchains, self.carried, strict=True):
             tip = limb.tip.value(p, R)
-            actual = feature.value(poses_at([at], feature.links))
+            actual = feature.value(collect_poses([at], feature.links))
             mode = limb.modes(tip, actual)
-            if not np.linalg.norm(limb.solve(tip, mode)[1] - actual) < SAME_RELATION:
+            if not np.linalg.norm(limb.solve(tip, mode)[1] - actual) < RELATION_ANGLE_TOL:
                 raise NoLegForm(f"leg {limb.label} does not follow its form")
             limbs.append(replace(limb, mode=float(mode[0])))
         return LegForms(tuple(limbs), self.vectors, self.points, self.bounds)
 
 
-def pattern(
+def build_leg_pattern(
     decomposition: LegDecomposition,
     features: Sequence[NamedVector],
     coordinates: PathCoordinates,
@@ -133,8 +135,8 @@ def pattern(
             raise NoLegForm(f"leg {leg.label} has no known closed form (rod on a crank or rail, or sliding rod)")
         found += of_leg
     limbs, carried = (tuple(part) for part in zip(*found, strict=True)) if found else ((), ())
-    loose = tuple(leg.label for leg in decomposition.legs if not sight.closes(leg, carried))
+    loose = tuple(leg.label for leg in decomposition.legs if not sight.has_closed_inner_loops(leg, carried))
     vectors = {f.symbol: sight.source(f, carried) for f in features}
     points = tuple(f.symbol for f in features if isinstance(f, BodyPoint))
-    kept = tuple(bounds(sight, lambda feature: sight.source(feature, carried)))
+    kept = tuple(list_joint_limits(sight, lambda feature: sight.source(feature, carried)))
     return LegPattern(coordinates, limbs, carried, vectors, points, kept, loose)

@@ -10,7 +10,7 @@ from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
-from ...constraints.condition import Condition, Named
+from ...constraints.condition import Condition, NamedCondition
 from ...constraints.pattern import ConstraintPattern
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
@@ -18,23 +18,23 @@ from ...kinematics.continuation import lead_to, track
 from ...kinematics.joint_coordinates import OfConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...mechanism.observation import Observation
-from ...mechanism.pose import AskedPose, Pose, PoseLike, asked_pose
+from ...mechanism.pose import AskedPose, Pose, PoseLike, parse_pose
 from ...options import option
 from ...progress import report
 from ...records import As, Recorded, Shown, recorded
 from ...results import Result, Value
-from ...tolerances import AS_PRINTED, RANK_CUTOFF, RANK_GAP, SOLVED
-from ..accuracy.measurement_bounds import unseen
+from ...tolerances import CLOSURE_SOLVER_TOL, PRINTED_POSE_TOL, RANK_CUTOFF_FRACTION, RANK_GAP_MIN
+from ..accuracy.measurement_bounds import find_invisible
 from ..analysis_declaration import analysis
 from ..measured import MeasuredRobot
 from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike, StartPose
-from ..pose_requests import configurations_at
-from ..singularity.condition_check import smallest_of, weakest
-from .condition_enclosure import ConditionEnclosure, PathSegment, enclose_value, is_beyond, sign_of
-from .leg_forms import LegForms, LegPattern, pattern
-from .path_segments import PathCoordinates, Place, WorkingModeChange, path_coordinates
+from ..pose_requests import solve_configurations
+from ..singularity.condition_check import compute_smallest_value, compute_smallest_values
+from .condition_enclosure import ConditionEnclosure, PathSegment, enclose_value, has_sign_change, is_beyond
+from .leg_forms import LegForms, LegPattern, build_leg_pattern
+from .path_segments import PathCoordinates, Place, WorkingModeChange, list_path_coordinates
 from .roadmap import PlannedPath, PoseRegion, plan
-from .vector_expressions import NoLegForm, limbs_of
+from .vector_expressions import NoLegForm, collect_subchains
 from .verdicts import SAME, SEPARATED, UNDECIDED
 
 
@@ -62,7 +62,7 @@ class SampledRoute(Value, all_recorded=True):
     out_of_view: str | None
 
 
-class Crossing(NamedTuple):
+class LegModeChange(NamedTuple):
     """Leg that changes its working mode, and the pose of the path at which it does."""
 
     leg: str
@@ -125,34 +125,38 @@ class PathAnswer(Result, shown_as="path"):
         return f"{self.setup.headline()}: {self.verdict}"
 
     @property
-    def stays(self) -> bool:
+    def is_at_goal(self) -> bool:
         """True if start and goal are one pose of the platform, to the digits printed."""
         one, other = (at.pose(self.setup.motion.link) for at in (self.start.configuration, self.goal.configuration))
-        return bool(np.max(np.abs(one - other)) <= AS_PRINTED)
+        return bool(np.max(np.abs(one - other)) <= PRINTED_POSE_TOL)
 
     @property
     @recorded(As("not_considered"))
     def not_proved(self) -> str:
         """Facts that a certificate does not cover."""
         joints = f"limits of joints {', '.join(self.limits_ignored)}; " if self.limits_ignored else ""
-        if not all(o.by_segment for o in self.setup.observed):
+        if not all(o.is_segment_direction for o in self.setup.observed):
             joints += "points behind a camera or out of its image; "
         return f"{joints}collisions and constraint singularities of the loops are not considered"
 
     @property
     def where(self) -> str:
         """Restriction of the paths: all that is observed has a value on them (no point is in a camera's centre)."""
-        return "" if all(o.by_segment for o in self.setup.observed) else "on which all that is observed has a value "
+        return (
+            ""
+            if all(o.is_segment_direction for o in self.setup.observed)
+            else "on which all that is observed has a value "
+        )
 
     @property
     @recorded()
-    def crossings(self) -> tuple[Crossing, ...]:
+    def crossings(self) -> tuple[LegModeChange, ...]:
         """Legs that change their working mode, each with the index of its limit in ``poses``."""
         found, place = [], 0
         for way in self.segments:
             if isinstance(way, WorkingModeChange):
-                found.append(Crossing(way.leg, place + 1))
-            place += len(_marks(way))
+                found.append(LegModeChange(way.leg, place + 1))
+            place += len(_list_marks(way))
         return tuple(found)
 
     observed = Shown(tuple[Observation, ...], lambda self: self.setup.observed)
@@ -163,13 +167,13 @@ class PathAnswer(Result, shown_as="path"):
     )
 
 
-def between(answer: PathAnswer, coordinates: PathCoordinates, ways: Sequence[PathSegment]) -> list[Pose]:
+def list_segment_poses(answer: PathAnswer, coordinates: PathCoordinates, ways: Sequence[PathSegment]) -> list[Pose]:
     """Return the platform's poses between the segments, and the pose at a leg's limit in the middle of a change of
     working mode."""
     motion = coordinates.motion
     here = answer.start.configuration
     found = []
-    for p, R in [place for way in ways for place in _marks(way)][:-1]:
+    for p, R in [place for way in ways for place in _list_marks(way)][:-1]:
         if coordinates.turning:
             found.append(motion.pose(coordinates.frame(p, R)))
             continue
@@ -178,7 +182,7 @@ def between(answer: PathAnswer, coordinates: PathCoordinates, ways: Sequence[Pat
     return found
 
 
-def _marks(way: PathSegment) -> list[tuple[Array, Array]]:
+def _list_marks(way: PathSegment) -> list[tuple[Array, Array]]:
     if not isinstance(way, WorkingModeChange):
         return [way.end]
     p, R, _ = way.at(np.array([0.5]))
@@ -193,11 +197,11 @@ def _lead_to(here: ClosedConfiguration, coordinates: PathCoordinates, p: Array) 
     return track(here, motion, goal)[0]
 
 
-SAMPLES = 33
+PATH_SAMPLES_COUNT = 33
 """Number of poses at which a path that cannot be enclosed is sampled."""
-BUDGET = 10_000
+PATH_INTERVALS_MAX = 10_000
 """Largest number of intervals for one path."""
-CLEAR = RANK_CUTOFF * RANK_GAP
+CLEAR = RANK_CUTOFF_FRACTION * RANK_GAP_MIN
 """Smallest |value| of a condition that counts as nonzero."""
 
 
@@ -237,10 +241,10 @@ class PathPlanner(Value):
     @cached_property
     def pattern(self) -> LegPattern | str:
         """Forms of legs and vectors, or the reason why there are none."""
-        if not isinstance(self.condition, Named):
+        if not isinstance(self.condition, NamedCondition):
             return "the condition has no named vectors"
         used = {str(symbol) for symbol in self.condition.expression.free_symbols}
-        features = [f for f in self.structure.features if not sign_of(self.condition) or f.symbol in used]
+        features = [f for f in self.structure.features if not has_sign_change(self.condition) or f.symbol in used]
         many = self.motion.translations.shape[1] + self.motion.rotations.shape[1]
         reason = (
             f"the {many} parts of the platform's pose that change depend on each other, {self.setup.dof} are "
@@ -249,9 +253,9 @@ class PathPlanner(Value):
         if many == self.setup.dof:
             reason = "the platform has another dof at the zero configuration than elsewhere"
         observation_model = self.setup.samples.observation_model
-        for each in path_coordinates(self.setup.decomposition, observation_model, self.setup.dof, self.members):
+        for each in list_path_coordinates(self.setup.decomposition, observation_model, self.setup.dof, self.members):
             try:
-                return pattern(self.setup.decomposition, features, each, self.members)
+                return build_leg_pattern(self.setup.decomposition, features, each, self.members)
             except NoLegForm as why:
                 reason = str(why)
         return reason
@@ -259,7 +263,7 @@ class PathPlanner(Value):
     def enclosure(self, at: ClosedConfiguration) -> ConditionEnclosure:
         """Return the condition as a function of the pose, in the working mode of a configuration; raises
         ``NoLegForm``."""
-        if isinstance(self.pattern, str) or not isinstance(self.condition, Named):
+        if isinstance(self.pattern, str) or not isinstance(self.condition, NamedCondition):
             raise NoLegForm(str(self.pattern))
         return ConditionEnclosure(self.condition, self.pattern.forms(at))
 
@@ -269,13 +273,13 @@ class PathPlanner(Value):
         goal: ClosedConfiguration,
         *,
         seed: int = 0,
-        budget: int = BUDGET,
+        budget: int = PATH_INTERVALS_MAX,
         any_mode: bool = False,
     ) -> PathAnswer:
         """Search for a path without Type 2 singularity from a configuration to another, where legs that are not
         observed may be in any working mode; with ``any_mode`` to the other's pose, all legs in any working mode."""
         found, scene = self.condition, self.structure.values_at([start, goal])
-        values = found.evaluate(scene) if found.signed else smallest_of(found.rows(scene))
+        values = found.evaluate(scene) if found.signed else compute_smallest_values(found.rows(scene))
         ends = [
             PathEnd(self.motion.pose(at.pose(self.motion.link)), at, float(value))
             for at, value in zip((start, goal), values, strict=True)
@@ -298,13 +302,16 @@ class PathPlanner(Value):
         if min(abs(end.value) for end in ends) < CLEAR:
             least = min(ends, key=lambda end: abs(end.value))
             told = "a pose is singular, or too near to the singular locus to be distinguished"
-            if abs(least.value) < SOLVED and weakest(least.configuration, self.setup.samples.observation_model) > CLEAR:
+            if (
+                abs(least.value) < CLOSURE_SOLVER_TOL
+                and compute_smallest_value(least.configuration, self.setup.samples.observation_model) > CLEAR
+            ):
                 told = "the condition vanishes where no twist is unobserved: it is not this robot's"
             return replace(answer, reason=told)
         try:
             enclosures = [self.enclosure(end.configuration) for end in ends]
         except NoLegForm as why:
-            answer = _pointwise(answer, str(why))
+            answer = _compare_end_points(answer, str(why))
             return answer if answer.verdict == SEPARATED else replace(answer, road=self.road(start, goal))
         return self._decide(answer, enclosures, seed, budget)
 
@@ -313,17 +320,23 @@ class PathPlanner(Value):
         motion, observation_model = self.motion, self.setup.samples.observation_model
         target, X = motion.whole(goal.pose(motion.link)), start.pose(motion.link)
         way = [start]
-        fractions = np.linspace(0, 1, SAMPLES)
+        fractions = np.linspace(0, 1, PATH_SAMPLES_COUNT)
         for fraction in fractions[1:]:
             there, came = lead_to(way[-1], motion, target.towards(X, float(fraction)), last=fraction == 1)
             if not came:
                 break
             way.append(there)
         scene = self.structure.values_at(way)
-        values = self.condition.evaluate(scene) if self.condition.signed else smallest_of(self.condition.rows(scene))
+        values = (
+            self.condition.evaluate(scene)
+            if self.condition.signed
+            else compute_smallest_values(self.condition.rows(scene))
+        )
         worst = int(np.argmin(np.abs(values)))
         changes = int(np.sum(values[1:] * values[:-1] < 0)) if self.condition.signed else None
-        lost = next((f"{o.kind} {o.leg}" for at in way if (o := unseen(at, observation_model)) is not None), None)
+        lost = next(
+            (f"{o.kind} {o.leg}" for at in way if (o := find_invisible(at, observation_model)) is not None), None
+        )
         return SampledRoute(
             len(way),
             float(abs(values[worst])),
@@ -346,7 +359,7 @@ class PathPlanner(Value):
         forms = f", for forms that are fitted to samples: {', '.join(fitted)}" if fitted else ""
         if not all(sure) or margin == 0:
             return replace(answer, reason="at a pose reach or value cannot be enclosed away from zero")
-        if enclosures[0].signed and values[0] * values[1] < 0:
+        if enclosures[0].has_sign and values[0] * values[1] < 0:
             seen = () if answer.any_mode else {o.leg for o in self.setup.observed}
             across, others, margin = self._across(enclosures[1], (p[1], R[1]), values, seen)
             if not others:
@@ -358,13 +371,13 @@ class PathPlanner(Value):
                     boxes=1 + len(across),
                     goal_modes=across,
                     reason=(
-                        f"the expression is enclosed with opposite signs at the two {_ends(answer.any_mode)}: every "
+                        f"the expression is enclosed with opposite signs at the two {_describe_ends(answer.any_mode)}: every "
                         f"path between them {answer.where}crosses its zeros{forms}"
                     ),
                 )
             return self._lead_to_other_modes(answer, enclosures[0], others, (p, R), seed, budget)
         if answer.signed and answer.start.value * answer.goal.value < 0:
-            return _pointwise(answer, "its sign is that of a determinant")
+            return _compare_end_points(answer, "its sign is that of a determinant")
         return self._lead(answer, enclosures, (p, R), seed, budget)
 
     def _across(
@@ -374,7 +387,7 @@ class PathPlanner(Value):
         proved to be opposite to the start's; all others without a joint proved to be beyond its limits, first those
         nearest to the goal's; and the smallest |value| at the start and in the former."""
         limbs, across, others, margin = goal.forms.subchains, [goal.forms.modes], [], min(map(abs, values))
-        able = [k for k in sorted(limbs_of(tuple(goal.forms.vectors.values()))) if limbs[k].label not in seen]
+        able = [k for k in sorted(collect_subchains(tuple(goal.forms.vectors.values()))) if limbs[k].label not in seen]
         for k in range(1, len(able) + 1):
             for part in combinations(able, k):
                 there = replace(goal, forms=reduce(LegForms.flipped, part, goal.forms))
@@ -447,9 +460,9 @@ class PathPlanner(Value):
         region = PoseRegion.around(coordinates, p, R)
         found = plan((enclosures[0], enclosures[1]), region, (p[0], R[0]), (p[1], R[1]), seed=seed, budget=budget)
         answer = self._add_ways(answer, found, self.pattern)
-        if not found.proved:
-            return replace(answer, reason=_why_undecided(found, enclosures, budget))
-        if not leads(found.ways, (p[0], R[0]), (p[1], R[1]), enclosures):
+        if not found.is_proved:
+            return replace(answer, reason=_explain_undecided(found, enclosures, budget))
+        if not is_connected_path(found.ways, (p[0], R[0]), (p[1], R[1]), enclosures):
             return replace(answer, reason="no path was proved: the path found does not join the two poses")
         if self.pattern.loose:
             ends = answer.start.configuration, answer.goal.configuration
@@ -484,7 +497,7 @@ class PathPlanner(Value):
         )
         if not found.ways:
             return answer
-        poses = answer.start.pose, *between(answer, known.coordinates, found.ways), answer.goal.pose
+        poses = answer.start.pose, *list_segment_poses(answer, known.coordinates, found.ways), answer.goal.pose
         return replace(answer, coordinates=known.coordinates, segments=found.ways, poses=poses)
 
 
@@ -504,7 +517,7 @@ def path(
     start: StartPose,
     goal: Annotated[PoseLike, option("Goal pose; mode:2 is a mode with the directions at the start.", "POSE")],
     seed: Seed = 0,
-    budget: int = BUDGET,
+    budget: int = PATH_INTERVALS_MAX,
 ) -> PathAnswer:
     """Find a path without Type 2 singularity between two poses, with a proof: same aspect, separated or undecided.
 
@@ -530,7 +543,7 @@ def path(
     ------
     BadRequest
         If a name or a part of a pose is unknown.
-    PoseNotReached
+    PoseReachFailure
         If start or goal is not reached.
 
     Notes
@@ -550,38 +563,45 @@ def path(
     >>> hrsynth.path("3rrr_m1", start="x=0,y=0,phi=0", goal="x=0.02,y=0,phi=5deg").verdict
     'same aspect'
     """
-    wanted = [asked_pose(each) for each in (start, goal)]
+    wanted = [parse_pose(each) for each in (start, goal)]
     setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed)
-    return between_poses(setup, wanted, any_mode=isinstance(wanted[1], Pose), seed=seed, budget=budget)
+    return plan_between_poses(setup, wanted, any_mode=isinstance(wanted[1], Pose), seed=seed, budget=budget)
 
 
-def between_poses(
-    setup: ObservedRobot, wanted: Sequence[AskedPose], *, any_mode: bool, seed: int = 0, budget: int = BUDGET
+def plan_between_poses(
+    setup: ObservedRobot,
+    wanted: Sequence[AskedPose],
+    *,
+    any_mode: bool,
+    seed: int = 0,
+    budget: int = PATH_INTERVALS_MAX,
 ) -> PathAnswer:
     """Search for a path between the configurations at a start and a goal, see :meth:`PathPlanner.join`."""
     aspects = PathPlanner.of(setup.telling(wanted), seed=seed)
     report("poses")
-    first, last = configurations_at(aspects.setup, wanted, by_modes=True)
+    first, last = solve_configurations(aspects.setup, wanted, by_modes=True)
     return aspects.join(first, last, seed=seed, budget=budget, any_mode=any_mode)
 
 
-def leads(ways: Sequence[PathSegment], start: Place, goal: Place, enclosures: Sequence[ConditionEnclosure]) -> bool:
+def is_connected_path(
+    ways: Sequence[PathSegment], start: Place, goal: Place, enclosures: Sequence[ConditionEnclosure]
+) -> bool:
     """Return True if segments lead from pose to pose and from working mode to working mode without a gap."""
     here, modes = start, list(enclosures[0].forms.modes)
     for way in ways:
-        if _gap(here, (way.p, way.R)) > SOLVED:
+        if _measure_gap(here, (way.p, way.R)) > CLOSURE_SOLVER_TOL:
             return False
         here = way.end
         if isinstance(way, WorkingModeChange):
             modes[way.limb] *= -1
-    return _gap(here, goal) <= SOLVED and tuple(modes) == enclosures[1].forms.modes
+    return _measure_gap(here, goal) <= CLOSURE_SOLVER_TOL and tuple(modes) == enclosures[1].forms.modes
 
 
-def _gap(one: Place, other: Place) -> float:
+def _measure_gap(one: Place, other: Place) -> float:
     return max(float(np.max(np.abs(a - b))) for a, b in zip(one, other, strict=True))
 
 
-def _why_undecided(found: PlannedPath, enclosures: Sequence[ConditionEnclosure], budget: int) -> str:
+def _explain_undecided(found: PlannedPath, enclosures: Sequence[ConditionEnclosure], budget: int) -> str:
     """Return the reason why a plan decides nothing."""
     used = "limit of intervals reached" if found.boxes >= budget else "the road map does not join the poses"
     if found.ways:
@@ -591,7 +611,7 @@ def _why_undecided(found: PlannedPath, enclosures: Sequence[ConditionEnclosure],
     return f"no path was proved: {used}; leg {', '.join(legs)} is in different working modes at the two poses"
 
 
-def _ends(any_mode: bool) -> str:
+def _describe_ends(any_mode: bool) -> str:
     """Return which ends of a path a verdict is about."""
     return (
         "poses, at the goal in each working mode within joint limits"
@@ -600,7 +620,7 @@ def _ends(any_mode: bool) -> str:
     )
 
 
-def _pointwise(answer: PathAnswer, why: str) -> PathAnswer:
+def _compare_end_points(answer: PathAnswer, why: str) -> PathAnswer:
     """Decide from the two configurations alone: opposite signs of a continuous expression separate them."""
     ends = answer.start.value, answer.goal.value
     if answer.signed and ends[0] * ends[1] < 0:

@@ -16,14 +16,14 @@ import numpy as np
 from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail
 from ...closed_forms.platform_points import PlatformPoint
 from ...geometry.balls import Field, widen
-from ...geometry.so3 import exponential, logarithm
-from ...geometry.vectors import Array, cross, hat, inverse
+from ...geometry.so3 import convert_rotations_to_vectors, convert_vectors_to_rotations
+from ...geometry.vectors import Array, cross, hat, invert_pose
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
-from ...kinematics.velocity_relation import ObservationModel, relation
+from ...kinematics.velocity_relation import ObservationModel, compute_relation
 from ...mechanism.legs import LegDecomposition
 from ...results import Value
-from ...tolerances import FOLLOWED
+from ...tolerances import HIDDEN_ROBOT_RESIDUAL_TOL
 
 Place = tuple[Array, Array]
 """Pose: the point (3,) and the platform's rotation (3, 3)."""
@@ -52,7 +52,7 @@ class PathCoordinates(Value):
         return X
 
 
-def path_coordinates(
+def list_path_coordinates(
     decomposition: LegDecomposition,
     observation_model: ObservationModel,
     dof: int,
@@ -61,11 +61,11 @@ def path_coordinates(
     """Yield the whole pose of the platform if its parts are independent, then the positions of joint centres on it that
     have the full platform dof."""
     mechanism = decomposition.mechanism
-    X_PB = inverse(mechanism.links[mechanism.platform].pose)
+    X_PB = invert_pose(mechanism.links[mechanism.platform].pose)
     centres = [(X_PB @ np.append(joint.point, 1.0))[:3] for joint in mechanism.joints_of(mechanism.platform)]
     for point in (observation_model.point, *centres):
         asked = replace(observation_model, point=point, observations=())
-        if any(relation(at, asked).dof.value != dof for at in configurations):
+        if any(compute_relation(at, asked).dof.value != dof for at in configurations):
             continue
         motion = PlatformMotion.of(configurations, asked)
         shifts, spins = motion.translations.shape[1], motion.rotations.shape[1]
@@ -85,7 +85,7 @@ class StraightSegment(Value):
     @classmethod
     def between(cls, one: tuple[Array, Array], two: tuple[Array, Array]) -> StraightSegment:
         """Return the segment from a pose (3,), (3, 3) to another."""
-        return cls(*one, two[0] - one[0], logarithm(two[1] @ one[1].T))
+        return cls(*one, two[0] - one[0], convert_rotations_to_vectors(two[1] @ one[1].T))
 
     def at(self, fractions: Field) -> tuple[Field, Field]:
         """Return poses (n, 3), (n, 3, 3) at fractions (n,); of balls, with all poses nearer than ``FOLLOWED``."""
@@ -98,20 +98,20 @@ class StraightSegment(Value):
             R = self.R + sines[:, None, None] * (K @ self.R) + (1 - cosines)[:, None, None] * (K @ K @ self.R)
         if p.dtype == object:
             R = R.astype(object)
-        return widen(p, FOLLOWED), widen(R, FOLLOWED)
+        return widen(p, HIDDEN_ROBOT_RESIDUAL_TOL), widen(R, HIDDEN_ROBOT_RESIDUAL_TOL)
 
     @property
     def end(self) -> tuple[Array, Array]:
         """Pose at λ = 1."""
-        return self.p + self.shift, exponential(self.turn) @ self.R
+        return self.p + self.shift, convert_vectors_to_rotations(self.turn) @ self.R
 
 
-def poses_between(p: Array, R: Array, q: Array, S: Array, fractions: Array) -> tuple[Array, Array, Array]:
+def interpolate_poses(p: Array, R: Array, q: Array, S: Array, fractions: Array) -> tuple[Array, Array, Array]:
     """Return poses (n, k, 3), (n, k, 3, 3) on the segments from poses (p, R) to (q, S), (n, 3) and (n, 3, 3), at
     fractions (k,); and the segments' lengths (n,) (characteristic lengths, radians)."""
-    turns = logarithm(S @ R.transpose(0, 2, 1))
+    turns = convert_rotations_to_vectors(S @ R.transpose(0, 2, 1))
     places = p[:, None] + fractions[:, None] * (q - p)[:, None]
-    turned = exponential(fractions[:, None] * turns[:, None]) @ R[:, None]
+    turned = convert_vectors_to_rotations(fractions[:, None] * turns[:, None]) @ R[:, None]
     return places, turned, np.hypot(np.linalg.norm(q - p, axis=1), np.linalg.norm(turns, axis=1))
 
 
@@ -174,13 +174,17 @@ class WorkingModeChange(Value):
             carried = self.centre + self.foot.at(fractions)
         else:
             carried = self.foot[0] + fractions[:, None] * (self.foot[1] - self.foot[0])
-        carried = widen(carried, FOLLOWED)
+        carried = widen(carried, HIDDEN_ROBOT_RESIDUAL_TOL)
         p = carried + self.rod.at(fractions) - (self.tip.constant + self.R @ self.tip.turned)
         R: Field = np.broadcast_to(self.R, (len(fractions), 3, 3))
-        return widen(p, FOLLOWED), widen(R.astype(p.dtype), FOLLOWED), (self.limb, carried)
+        return (
+            widen(p, HIDDEN_ROBOT_RESIDUAL_TOL),
+            widen(R.astype(p.dtype), HIDDEN_ROBOT_RESIDUAL_TOL),
+            (self.limb, carried),
+        )
 
 
-def mode_change(
+def build_mode_change(
     coordinates: PathCoordinates, limb: ClosedFormLeg, number: int, place: Place
 ) -> WorkingModeChange | None:
     """Return the segment of subchain ``number`` to its other working mode at a pose; None if the platform's motion has
@@ -194,9 +198,9 @@ def mode_change(
     ends = [limb.solve(tip, sign * limb.mode)[1][0] for sign in (1.0, -1.0)]
     rods = [tip[0] - end for end in ends]
     axis = limb.axis if isinstance(limb, OnCrank) else np.cross(*rods)
-    axis = axis / max(float(np.linalg.norm(axis)), FOLLOWED)
+    axis = axis / max(float(np.linalg.norm(axis)), HIDDEN_ROBOT_RESIDUAL_TOL)
     shifts = coordinates.motion.translations
-    if shifts.shape[1] < 2 or (shifts.shape[1] == 2 and np.linalg.norm(axis @ shifts) > FOLLOWED):
+    if shifts.shape[1] < 2 or (shifts.shape[1] == 2 and np.linalg.norm(axis @ shifts) > HIDDEN_ROBOT_RESIDUAL_TOL):
         return None
     rod = TurningVector.between(rods[0], rods[1], axis)
     if isinstance(limb, OnRail):

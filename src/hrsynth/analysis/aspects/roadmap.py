@@ -15,12 +15,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...budgets import FIRST_INTERVALS, REGION_WIDER
-from ...geometry.so3 import exponential, logarithm
+from ...budgets import PATH_FIRST_INTERVALS_COUNT, ROADMAP_REGION_FRACTION
+from ...geometry.so3 import convert_rotations_to_vectors, convert_vectors_to_rotations
 from ...geometry.vectors import Array
 from ...progress import report
 from .condition_enclosure import ConditionEnclosure, PathSegment, Proof, prove
-from .path_segments import PathCoordinates, Place, StraightSegment, WorkingModeChange, mode_change, poses_between
+from .path_segments import (
+    PathCoordinates,
+    Place,
+    StraightSegment,
+    WorkingModeChange,
+    build_mode_change,
+    interpolate_poses,
+)
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -41,10 +48,10 @@ class PoseRegion:
         """Return the region that is wider than known poses (n, 3), (n, 3, 3), around the first."""
         motion = coordinates.motion
         shifts = (p - p[0]) @ motion.translations
-        turns = logarithm(R @ R[0].T) @ motion.rotations
+        turns = convert_rotations_to_vectors(R @ R[0].T) @ motion.rotations
         middle = p[0] + motion.translations @ ((shifts.max(axis=0) + shifts.min(axis=0)) / 2)
         exact = cls(coordinates, (middle, R[0]), np.ptp(shifts, axis=0) / 2, np.max(np.abs(turns), axis=0, initial=0.0))
-        return exact.wider(REGION_WIDER)
+        return exact.wider(ROADMAP_REGION_FRACTION)
 
     def wider(self, factor: float) -> PoseRegion:
         """Return the region grown by a factor; no rotation is longer than π."""
@@ -56,19 +63,19 @@ class PoseRegion:
         motion = self.coordinates.motion
         p = self.centre[0] + (rng.uniform(-1, 1, (count, len(self.shift))) * self.shift) @ motion.translations.T
         turns = (rng.uniform(-1, 1, (count, len(self.turn))) * self.turn) @ motion.rotations.T
-        return p, exponential(turns) @ self.centre[1]
+        return p, convert_vectors_to_rotations(turns) @ self.centre[1]
 
 
-DRAWS = 30
+ROADMAP_DRAWS_MAX = 30
 """Largest number of random poses for each that is added to a working mode."""
-NEIGHBOURS = 8
-SHEETS = 16
+ROADMAP_NEIGHBOURS_COUNT = 8
+ROADMAP_WORKING_MODES_MAX = 16
 """Largest number of working modes in one map."""
-CROSSINGS = 12
+MODE_CROSSINGS_PER_ROUND_MAX = 12
 """Largest number of crossings that are added between two working modes in each round."""
-HOP = 2.0
+MODE_CHANGE_LENGTH_FRACTION = 2.0
 """Length of a change of working mode (characteristic lengths, radians)."""
-ROAD = 400
+ROADMAP_SEGMENT_INTERVALS_MAX = 400
 """Largest number of intervals for one road."""
 GLANCES = np.linspace(0, 1, 10)
 """Fractions of a road at which it is evaluated in floats before it is added to the map."""
@@ -119,7 +126,7 @@ class RoadMap:
     def open(self, limbs: Sequence[int]) -> None:
         """Add the working modes in which some of these subchains differ from the start's; if these are too many, those
         in which the first of them differ."""
-        many = 2 ** len(limbs) > SHEETS
+        many = 2 ** len(limbs) > ROADMAP_WORKING_MODES_MAX
         chosen = (
             [limbs[:k] for k in range(len(limbs) + 1)]
             if many
@@ -136,7 +143,7 @@ class RoadMap:
     def add(self, region: PoseRegion, rng: np.random.Generator, count: int) -> None:
         """Add up to ``count`` random poses in each working mode, reachable and on the side of the start, with crossings
         where two working modes have a pose near a subchain's limit."""
-        p, R = region.draw(rng, DRAWS * count)
+        p, R = region.draw(rng, ROADMAP_DRAWS_MAX * count)
         reach_margins = self.enclosures[0].forms.at(p, R).reach_margins
         kept = (reach_margins[:, : len(self.enclosures[0].forms.subchains)] > 0).all(axis=1)
         p, R, reach_margins = p[kept], R[kept], reach_margins[kept]
@@ -150,7 +157,7 @@ class RoadMap:
                 self._place((p[i], R[i]), mode)
         for one, two, limb in self._adjacent():
             near = np.flatnonzero(beside[one] & beside[two])
-            for i in near[np.argsort(reach_margins[near, limb], kind="stable")][:CROSSINGS]:
+            for i in near[np.argsort(reach_margins[near, limb], kind="stable")][:MODE_CROSSINGS_PER_ROUND_MAX]:
                 self._cross((p[i], R[i]), one, two, limb)
 
     def _adjacent(self) -> Iterator[tuple[int, int, int]]:
@@ -169,12 +176,12 @@ class RoadMap:
     def _cross(self, place: Place, one: int, two: int, limb: int) -> None:
         enclosure = self.enclosures[one]
         ways = [
-            mode_change(self.region.coordinates, self.enclosures[mode].forms.subchains[limb], limb, place)
+            build_mode_change(self.region.coordinates, self.enclosures[mode].forms.subchains[limb], limb, place)
             for mode in (one, two)
         ]
         if ways[0] is None or ways[1] is None:
             return
-        weight = self._weights(np.array([HOP]), *enclosure.at(*ways[0].at(GLANCES)))[0]
+        weight = self._weights(np.array([MODE_CHANGE_LENGTH_FRACTION]), *enclosure.at(*ways[0].at(GLANCES)))[0]
         if np.isfinite(weight):
             here, there = self._place(place, one), self._place(place, two)
             self.crossings |= {(here, there): ways[0], (there, here): ways[1]}
@@ -187,11 +194,11 @@ class RoadMap:
 
     def proof(self, one: int, two: int) -> Proof:
         """Return the proof of a road, tried once."""
-        key = _key(one, two)
+        key = _make_road_key(one, two)
         if key not in self.proofs:
-            allowed = min(ROAD, self.budget - self.spent)
+            allowed = min(ROADMAP_SEGMENT_INTERVALS_MAX, self.budget - self.spent)
             self.proofs[key] = prove(self.enclosures[self.modes_of[key[0]]], self.road(*key), allowed)
-            self.spent += self.proofs[key].boxes + FIRST_INTERVALS
+            self.spent += self.proofs[key].boxes + PATH_FIRST_INTERVALS_COUNT
         return self.proofs[key]
 
     def graph(self) -> nx.Graph:
@@ -218,8 +225,10 @@ class RoadMap:
             return
         p, R = self._at(members)
         flat = np.hstack([p, R.reshape(-1, 9) / np.sqrt(2)])
-        around = cKDTree(flat).query(flat, k=min(NEIGHBOURS + 1, len(flat)))[1]
-        roads = {_key(int(members[i]), int(members[j])) for i, row in enumerate(around) for j in row if i != j}
+        around = cKDTree(flat).query(flat, k=min(ROADMAP_NEIGHBOURS_COUNT + 1, len(flat)))[1]
+        roads = {
+            _make_road_key(int(members[i]), int(members[j])) for i, row in enumerate(around) for j in row if i != j
+        }
         self._look(sorted(roads - self.weights.keys()))
 
     def _look(self, roads: Sequence[Road]) -> None:
@@ -227,7 +236,7 @@ class RoadMap:
         if not roads:
             return
         one, two = np.array(roads).T
-        places, turns, sizes = poses_between(*self._at(one), *self._at(two), GLANCES)
+        places, turns, sizes = interpolate_poses(*self._at(one), *self._at(two), GLANCES)
         reached, values = self.enclosures[self.modes_of[one[0]]].at(places.reshape(-1, 3), turns.reshape(-1, 3, 3))
         found = self._weights(sizes, reached.reshape(len(roads), -1), values.reshape(len(roads), -1))
         self.weights.update(zip(roads, map(float, found), strict=True))
@@ -249,7 +258,7 @@ class RoadMap:
         graph = self.graph()
         while self.spent < self.budget and nx.has_path(graph, 0, 1):
             found = list(pairwise(map(int, nx.shortest_path(graph, 0, 1, weight="weight"))))
-            hardest = sorted(found, key=lambda road: -self.weights[_key(*road)])
+            hardest = sorted(found, key=lambda road: -self.weights[_make_road_key(*road)])
             refused = next((road for road in hardest if not self.proof(*road).proved), None)
             if refused is None:
                 return [found[0][0], *(two for _, two in found)]
@@ -260,15 +269,17 @@ class RoadMap:
         """Return the path without the poses that a proved road can leave out."""
         kept, here = [way[0]], 0
         while here < len(way) - 1:
-            here = next(j for j in range(len(way) - 1, here, -1) if j == here + 1 or self._past(way[here : j + 1]))
+            here = next(
+                j for j in range(len(way) - 1, here, -1) if j == here + 1 or self._is_shortcut_proved(way[here : j + 1])
+            )
             kept.append(way[here])
         return kept
 
-    def _past(self, part: Sequence[int]) -> bool:
+    def _is_shortcut_proved(self, part: Sequence[int]) -> bool:
         """Return True if the straight road from the first to the last of a part in one working mode is proved."""
         if any(self.modes_of[i] != self.modes_of[part[0]] for i in part):
             return False
-        road = _key(part[0], part[-1])
+        road = _make_road_key(part[0], part[-1])
         if road not in self.weights:
             self._look([road])
         return bool(np.isfinite(self.weights[road])) and self.proof(*road).proved
@@ -289,11 +300,11 @@ class RoadMap:
             return []
         here = np.array(list(reached))
         goal = np.ones_like(here)
-        last = here[np.argmin(poses_between(*self._at(here), *self._at(goal), GLANCES)[2])]
+        last = here[np.argmin(interpolate_poses(*self._at(here), *self._at(goal), GLANCES)[2])]
         return [int(i) for i in reached[int(last)]] + [1]
 
 
-def _key(one: int, two: int) -> Road:
+def _make_road_key(one: int, two: int) -> Road:
     return min(one, two), max(one, two)
 
 
@@ -312,7 +323,7 @@ class PlannedPath:
     boxes: int
 
     @property
-    def proved(self) -> bool:
+    def is_proved(self) -> bool:
         """True if the whole path is proved."""
         return bool(self.proofs) and all(proof.proved for proof in self.proofs)
 
@@ -347,7 +358,9 @@ def plan(
         if limb.mode != other.mode
     ]
     able = [
-        number for number, limb in enumerate(limbs) if mode_change(region.coordinates, limb, number, start) is not None
+        number
+        for number, limb in enumerate(limbs)
+        if build_mode_change(region.coordinates, limb, number, start) is not None
     ]
     if not set(crossed) <= set(able):
         return PlannedPath((), (), roads.spent)

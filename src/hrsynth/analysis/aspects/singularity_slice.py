@@ -23,11 +23,17 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...budgets import SECTION_APART, SECTION_ITERATIONS, SECTION_PLACES, SECTION_STEP, SECTION_STEPS
-from ...geometry.balls import around, jets
+from ...budgets import (
+    SLICE_CURVE_DISTANCE_TOL,
+    SLICE_CURVE_STEP_FRACTION,
+    SLICE_CURVE_STEPS_MAX,
+    SLICE_GRID_STEPS_COUNT,
+    SLICE_NEWTON_STEPS_MAX,
+)
+from ...geometry.balls import enclose_around, make_ball_jets
 from ...geometry.vectors import Array
 from ...records import As, Record, Recorded, Shown
-from ...tolerances import COMPLEX_STEP, FOLLOWED, SAME_SPOT, SOLVED
+from ...tolerances import CLOSURE_SOLVER_TOL, COMPLEX_STEP_MAX, HIDDEN_ROBOT_RESIDUAL_TOL, SINGULAR_POSE_DISTANCE_TOL
 from ..modes.polynomials import krawczyk
 from .three_cranks import ThreeCranks
 
@@ -62,16 +68,16 @@ class SingularitySlice(Record):
     directions = Shown(list[str], lambda self: self.robot.labels[1:])
 
 
-def _times(a: Numbers, b: Numbers) -> Any:
+def _compute_cross(a: Numbers, b: Numbers) -> Any:
     """Return a × b of two vectors of the plane."""
     return a[0] * b[1] - a[1] * b[0]
 
 
-def _square(a: Numbers) -> Any:
+def _compute_square(a: Numbers) -> Any:
     return a[0] * a[0] + a[1] * a[1]
 
 
-def _aside(factor: Any, a: Numbers) -> list[Any]:
+def _rotate_quarter(factor: Any, a: Numbers) -> list[Any]:
     """Return i a."""
     return [-factor * a[1], factor * a[0]]
 
@@ -98,13 +104,13 @@ class _Place(NamedTuple):
     def rate(self, pick: int) -> Any:
         """Return g: the rate of f in that motion, ṙ_k = ω i r_k and ẇ_k = v + ṙ_k."""
         t, omega = self.motion(pick)
-        v = _aside(t, self.w[0])
+        v = _rotate_quarter(t, self.w[0])
         m, n = [], []
         for r, w in zip(self.r, self.w[1:], strict=True):
-            turned = _aside(omega, r)
+            turned = _rotate_quarter(omega, r)
             moved = [v[0] + turned[0], v[1] + turned[1]]
-            m.append(_times(turned, w) + _times(r, moved))
-            n.append(_times(v, w) + _times(self.w[0], moved))
+            m.append(_compute_cross(turned, w) + _compute_cross(r, moved))
+            n.append(_compute_cross(v, w) + _compute_cross(self.w[0], moved))
         return m[1] * self.n[0] + self.m[1] * n[0] - m[0] * self.n[1] - self.m[0] * n[1]
 
 
@@ -131,11 +137,18 @@ class LockedLegSection:
                 [number(away.real) + w[0][0] + turned[0] - w[k][0], number(away.imag) + w[0][1] + turned[1] - w[k][1]]
             )
         lengths = [
-            _square(x[2:4]) - 1,
-            *(_square(w[k]) - number(robot.cranks[k]) ** 2 for k in range(3)),
-            *(_square(e[k]) - number(robot.rods[k + 1]) ** 2 for k in (0, 1)),
+            _compute_square(x[2:4]) - 1,
+            *(_compute_square(w[k]) - number(robot.cranks[k]) ** 2 for k in range(3)),
+            *(_compute_square(e[k]) - number(robot.rods[k + 1]) ** 2 for k in (0, 1)),
         ]
-        return _Place(lengths, w, e, r, [_times(r[k], w[k + 1]) for k in (0, 1)], [_times(w[0], w[k]) for k in (1, 2)])
+        return _Place(
+            lengths,
+            w,
+            e,
+            r,
+            [_compute_cross(r[k], w[k + 1]) for k in (0, 1)],
+            [_compute_cross(w[0], w[k]) for k in (1, 2)],
+        )
 
     def curve(self, x: Numbers) -> list[Any]:
         """Return the residuals of the curve, (7,)."""
@@ -154,40 +167,40 @@ class LockedLegSection:
         return [*one.lengths, one.f, *two.lengths[:4], two.f, *apart]
 
 
-def section(robot: ThreeCranks, held: complex) -> SingularitySlice:
+def compute_singularity_slice(robot: ThreeCranks, held: complex) -> SingularitySlice:
     """Compute the curve, its cusps and its nodes: from a grid of ``budgets.SECTION_STEPS`` rotations of crank and
     platform, enclosed where Krawczyk's operator proves them."""
-    leg, thick = LockedLegSection(robot, held), LockedLegSection(robot, held, _ball)
-    traces = list(_traces(leg))
+    leg, thick = LockedLegSection(robot, held), LockedLegSection(robot, held, _convert_to_ball)
+    traces = list(_trace_pieces(leg))
     cusps: list[tuple[Array, SectionPoint]] = []
-    for x in (x for trace in traces for x in _changes(leg, trace)):
+    for x in (x for trace in traces for x in _find_sign_changes(leg, trace)):
         at = leg.place(x)
         pick = 1 + int(np.argmax([np.linalg.norm(at.motion(k)) for k in (1, 2)]))
-        found = _newton(partial(leg.cusp, pick=pick), x)
+        found = _solve_by_newton(partial(leg.cusp, pick=pick), x)
         # where (t, ω) vanishes f and g do so too, which shows nothing
-        if found is None or np.linalg.norm(leg.place(found).motion(pick)) < SAME_SPOT:
+        if found is None or np.linalg.norm(leg.place(found).motion(pick)) < SINGULAR_POSE_DISTANCE_TOL:
             continue
-        if any(np.linalg.norm(found - other) < SAME_SPOT for other, _ in cusps):
+        if any(np.linalg.norm(found - other) < SINGULAR_POSE_DISTANCE_TOL for other, _ in cusps):
             continue
-        box = krawczyk(_rows(partial(thick.cusp, pick=pick), 8), list(around(found, 0.0)))
+        box = krawczyk(_list_rows(partial(thick.cusp, pick=pick), 8), list(enclose_around(found, 0.0)))
         if box is not None and all(size.contains(0) for size in thick.place(box).motion(pick)):
             box = None
-        cusps.append((found, _point(leg, found, box)))
+        cusps.append((found, _build_point(leg, found, box)))
     nodes: list[tuple[Array, tuple[SectionPoint, SectionPoint]]] = []
-    for x in _meetings(traces):
-        found = _newton(leg.node, x)
-        if found is None or np.linalg.norm(found[:8] - found[8:]) < SAME_SPOT:
+    for x in _find_crossings(traces):
+        found = _solve_by_newton(leg.node, x)
+        if found is None or np.linalg.norm(found[:8] - found[8:]) < SINGULAR_POSE_DISTANCE_TOL:
             continue
         if any(
-            min(np.linalg.norm(found - other), np.linalg.norm(np.roll(found, 8) - other)) < SAME_SPOT
+            min(np.linalg.norm(found - other), np.linalg.norm(np.roll(found, 8) - other)) < SINGULAR_POSE_DISTANCE_TOL
             for other, _ in nodes
         ):
             continue
-        box = krawczyk(_rows(thick.node, 16), list(around(found, 0.0)))
+        box = krawczyk(_list_rows(thick.node, 16), list(enclose_around(found, 0.0)))
         if box is not None and all(a.overlaps(b) for a, b in zip(box[:8], box[8:], strict=True)):
             box = None
         halves = (None, None) if box is None else (box[:8], box[8:])
-        nodes.append((found, (_point(leg, found[:8], halves[0]), _point(leg, found[8:], halves[1]))))
+        nodes.append((found, (_build_point(leg, found[:8], halves[0]), _build_point(leg, found[8:], halves[1]))))
     return SingularitySlice(
         robot,
         held,
@@ -197,10 +210,10 @@ def section(robot: ThreeCranks, held: complex) -> SingularitySlice:
     )
 
 
-def _ball(value: float) -> Any:
+def _convert_to_ball(value: float) -> Any:
     from flint import arb
 
-    return arb(float(value), FOLLOWED)
+    return arb(float(value), HIDDEN_ROBOT_RESIDUAL_TOL)
 
 
 class _Trace(NamedTuple):
@@ -210,7 +223,7 @@ class _Trace(NamedTuple):
     shown: Array
 
 
-def sheet(robot: ThreeCranks, held: complex, crank: Array, turn: Array, sides: tuple[int, int]) -> Array:
+def solve_sheet(robot: ThreeCranks, held: complex, crank: Array, turn: Array, sides: tuple[int, int]) -> Array:
     """Return unknowns (8, ...) where the first crank and the platform have these rotations (rad) and the other cranks
     are on these sides of the lines to their tips; NaN out of reach."""
     w, rotation = [robot.cranks[0] * np.exp(1j * crank)], np.exp(1j * turn)
@@ -223,58 +236,60 @@ def sheet(robot: ThreeCranks, held: complex, crank: Array, turn: Array, sides: t
     return np.array([part for z in (w[0], rotation, w[1], w[2]) for part in (z.real, z.imag)])
 
 
-def _traces(leg: LockedLegSection) -> Iterator[_Trace]:
+def _trace_pieces(leg: LockedLegSection) -> Iterator[_Trace]:
     """Trace the pieces of f = 0: each from a point where f changes its sign on one of the four sheets."""
-    ticks = np.linspace(-np.pi, np.pi, SECTION_STEPS + 1)
+    ticks = np.linspace(-np.pi, np.pi, SLICE_GRID_STEPS_COUNT + 1)
     crank, turn = np.meshgrid(ticks, ticks, indexing="ij")
     known = np.zeros((0, 8))
     for one, other in product((1, -1), repeat=2):
-        x = sheet(leg.robot, leg.held, crank, turn, (one, other))
+        x = solve_sheet(leg.robot, leg.held, crank, turn, (one, other))
         signs = np.sign(leg.place(x).f)
         here = (signs[1:, 1:] * signs[:-1, 1:] < 0) | (signs[1:, 1:] * signs[1:, :-1] < 0)
         for seed in x[:, 1:, 1:][:, here].T:
-            if len(known) and np.min(np.linalg.norm(known - seed, axis=1)) < SECTION_APART:
+            if len(known) and np.min(np.linalg.norm(known - seed, axis=1)) < SLICE_CURVE_DISTANCE_TOL:
                 continue
-            start = _newton(leg.curve, seed, FOLLOWED)
-            if start is None or (len(known) and np.min(np.linalg.norm(known - start, axis=1)) < SECTION_APART):
+            start = _solve_by_newton(leg.curve, seed, HIDDEN_ROBOT_RESIDUAL_TOL)
+            if start is None or (
+                len(known) and np.min(np.linalg.norm(known - start, axis=1)) < SLICE_CURVE_DISTANCE_TOL
+            ):
                 continue
             unknowns = _follow_curve(leg, start)
             known = np.vstack([known, unknowns])
-            yield _Trace(unknowns, np.column_stack(_angles(leg, unknowns.T)))
+            yield _Trace(unknowns, np.column_stack(_list_angles(leg, unknowns.T)))
 
 
 def _follow_curve(leg: LockedLegSection, start: Array) -> Array:
     """Trace points (n, 8) of a piece of the curve until it closes; in both directions if it ends."""
     ways = []
     for sense in (1.0, -1.0):
-        here, way, tangent = start, [start], sense * np.linalg.svd(_slopes(leg.curve, start))[2][-1]
-        while len(way) < SECTION_PLACES:
-            found = _newton(leg.curve, here + SECTION_STEP * tangent, FOLLOWED)
-            if found is None or np.linalg.norm(found - here) > 2 * SECTION_STEP:
+        here, way, tangent = start, [start], sense * np.linalg.svd(_compute_jacobian(leg.curve, start))[2][-1]
+        while len(way) < SLICE_CURVE_STEPS_MAX:
+            found = _solve_by_newton(leg.curve, here + SLICE_CURVE_STEP_FRACTION * tangent, HIDDEN_ROBOT_RESIDUAL_TOL)
+            if found is None or np.linalg.norm(found - here) > 2 * SLICE_CURVE_STEP_FRACTION:
                 break
-            ahead = np.linalg.svd(_slopes(leg.curve, found))[2][-1]
+            ahead = np.linalg.svd(_compute_jacobian(leg.curve, found))[2][-1]
             here, tangent = found, ahead * np.sign(ahead @ tangent)
             way.append(here)
-            if len(way) > 3 and np.linalg.norm(here - start) < SECTION_STEP:
+            if len(way) > 3 and np.linalg.norm(here - start) < SLICE_CURVE_STEP_FRACTION:
                 return np.array([*way, start])
         ways.append(way)
     return np.array([*ways[1][:0:-1], *ways[0]])
 
 
-def _angles(leg: LockedLegSection, x: Array) -> list[Array]:
+def _list_angles(leg: LockedLegSection, x: Array) -> list[Array]:
     """Return crank, rotation and two directions (rad) at unknowns (8, ...)."""
     one, two = leg.place(x).rods
     return [np.arctan2(v[1], v[0]) for v in (x[0:2], x[2:4], one, two)]
 
 
-def _changes(leg: LockedLegSection, trace: _Trace) -> Iterator[Array]:
+def _find_sign_changes(leg: LockedLegSection, trace: _Trace) -> Iterator[Array]:
     """Yield points between which the rate of f in the remaining motion changes its sign."""
     for pick in (1, 2):
         g = leg.place(trace.unknowns.T).rate(pick)
         yield from trace.unknowns[np.flatnonzero(np.sign(g[1:]) != np.sign(g[:-1]))]
 
 
-def _meetings(traces: Sequence[_Trace]) -> Iterator[Array]:
+def _find_crossings(traces: Sequence[_Trace]) -> Iterator[Array]:
     """Yield pairs of points, (16,), near which images of pieces cross each other."""
     parts = [np.hstack([t.shown[:-1, 2:], t.shown[1:, 2:], t.unknowns[:-1]]) for t in traces]
     segments = np.vstack(parts) if parts else np.zeros((0, 12))
@@ -283,18 +298,20 @@ def _meetings(traces: Sequence[_Trace]) -> Iterator[Array]:
     for i in range(len(segments) - 1):
         away, other = start[i + 1 :] - start[i], step[i + 1 :]
         with np.errstate(invalid="ignore", divide="ignore"):
-            across = _times(step[i], other.T)
-            here, there = _times(away.T, other.T) / across, _times(away.T, step[i]) / across
+            across = _compute_cross(step[i], other.T)
+            here, there = _compute_cross(away.T, other.T) / across, _compute_cross(away.T, step[i]) / across
         for j in np.flatnonzero((here >= 0) & (here <= 1) & (there >= 0) & (there <= 1)) + i + 1:
-            if np.linalg.norm(places[j] - places[i]) > SECTION_APART:
+            if np.linalg.norm(places[j] - places[i]) > SLICE_CURVE_DISTANCE_TOL:
                 yield np.concatenate([places[i], places[j]])
 
 
-def _newton(system: Callable[[Numbers], list[Any]], x: Array, enough: float = SOLVED) -> Array | None:
+def _solve_by_newton(
+    system: Callable[[Numbers], list[Any]], x: Array, enough: float = CLOSURE_SOLVER_TOL
+) -> Array | None:
     """Return a zero near unknowns (n,), the nearest if there are more unknowns than equations; None if there is
     none."""
-    for _ in range(SECTION_ITERATIONS):
-        step = np.linalg.lstsq(_slopes(system, x), np.array(system(x), dtype=float))[0]
+    for _ in range(SLICE_NEWTON_STEPS_MAX):
+        step = np.linalg.lstsq(_compute_jacobian(system, x), np.array(system(x), dtype=float))[0]
         x = x - step
         size = np.linalg.norm(step)
         if size < enough:
@@ -304,9 +321,9 @@ def _newton(system: Callable[[Numbers], list[Any]], x: Array, enough: float = SO
     return None
 
 
-def _slopes(system: Callable[[Numbers], list[Any]], x: Array) -> Array:
+def _compute_jacobian(system: Callable[[Numbers], list[Any]], x: Array) -> Array:
     """Return the Jacobian by complex steps: the system is polynomial."""
-    return np.array(system(x[:, None] + COMPLEX_STEP * 1j * np.eye(len(x)))).imag / COMPLEX_STEP
+    return np.array(system(x[:, None] + COMPLEX_STEP_MAX * 1j * np.eye(len(x)))).imag / COMPLEX_STEP_MAX
 
 
 @dataclass(eq=False)
@@ -323,7 +340,7 @@ class _System:
             columns = []
             for i in range(self.count):
                 y: list[Any] = list(x)
-                y[i] = jets(np.array([x[i]], dtype=object))[0]
+                y[i] = make_ball_jets(np.array([x[i]], dtype=object))[0]
                 columns.append([value[1] if hasattr(value, "prec") else 0 * x[i] for value in self.system(y)])
             self.known = x, [list(row) for row in zip(*columns, strict=True)]
         return self.known[1]
@@ -344,13 +361,13 @@ class _Row(NamedTuple):
         return self.whole.slopes(x)[self.number]
 
 
-def _rows(system: Callable[[Numbers], list[Any]], count: int) -> list[_Row]:
+def _list_rows(system: Callable[[Numbers], list[Any]], count: int) -> list[_Row]:
     whole = _System(system, count)
     return [_Row(whole, number) for number in range(count)]
 
 
-def _point(leg: LockedLegSection, x: Array, box: Sequence[Any] | None) -> SectionPoint:
+def _build_point(leg: LockedLegSection, x: Array, box: Sequence[Any] | None) -> SectionPoint:
     """Return a point by its unknowns, and the box that was proved."""
-    angles = [float(angle) for angle in _angles(leg, x)]
+    angles = [float(angle) for angle in _list_angles(leg, x)]
     radius = None if box is None else max(float(abs(ball - float(v)).upper()) for ball, v in zip(box, x, strict=True))
     return SectionPoint(angles[0], angles[1], (angles[2], angles[3]), radius)

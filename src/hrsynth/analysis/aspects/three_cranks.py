@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...closed_forms.legs import OnCrank
-from ...geometry.vectors import Array, perpendicular
+from ...geometry.vectors import Array, find_perpendicular
 from ...kinematics.configuration import ClosedConfiguration, measure
-from ...tolerances import SAME_RELATION
+from ...tolerances import RELATION_ANGLE_TOL
 from .leg_forms import LegPattern
 from .path import PathPlanner
 
@@ -43,7 +43,7 @@ class CrankPlace:
     turn: float
 
 
-def three_cranks(
+def recognise_three_cranks(
     aspects: PathPlanner, configurations: Sequence[ClosedConfiguration]
 ) -> tuple[ThreeCranks, list[CrankPlace]] | str:
     """Return the robot in its plane, legs in the order in which they are observed, the first configuration being the
@@ -59,7 +59,7 @@ def three_cranks(
     if not len(pattern.subchains) == len(chosen) == 3:
         return "the legs are not three rods on cranks"
     normal = setup.motion.normal
-    x = perpendicular(normal)
+    x = find_perpendicular(normal)
     plane = np.array([x, np.cross(normal, x)]).T @ [1, 1j]
     feet = np.array([limb.centre for _, limb in chosen])
     places, tips = [], []
@@ -73,7 +73,7 @@ def three_cranks(
         seen = measure(at.model, at.q, setup.mechanism.base, setup.observed)[2]
         rods = corners - ends
         across = np.linalg.norm(np.cross(rods, seen), axis=1) / np.linalg.norm(rods, axis=1)
-        if np.max(across) > SAME_RELATION:
+        if np.max(across) > RELATION_ANGLE_TOL:
             return "the observed direction of a leg is not that of its rod"
         places.append(CrankPlace((ends - feet) @ plane, rods @ plane, float(np.angle((R[0] @ home.T @ x) @ plane))))
         tips.append(corners @ plane)
@@ -81,7 +81,7 @@ def three_cranks(
     return ThreeCranks(tuple(labels), feet @ plane, cranks, rods, tips[0] - tips[0][0]), places
 
 
-def mode_counts(robot: ThreeCranks, held: complex, first: Array, second: Array, steps: int) -> NDArray[np.int_]:
+def count_modes(robot: ThreeCranks, held: complex, first: Array, second: Array, steps: int) -> NDArray[np.int_]:
     """Count the modes where the second and third rod have these directions (n,), (m,) (rad), (n, m): the number of
     times that the third corner crosses its circle while the first two go around theirs, sampled at ``steps`` points.
     The first corner goes as far as the second reaches its circle, ``about`` the line to that circle's centre either

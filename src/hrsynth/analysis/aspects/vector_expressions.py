@@ -15,13 +15,13 @@ import numpy as np
 
 from ...closed_forms.platform_points import ORIGIN, PlatformPoint
 from ...constraints.named_vectors import BodyPoint, BodyVector, NamedVector
-from ...geometry.balls import Field, unit_balls
-from ...geometry.lines import distance
+from ...geometry.balls import Field, normalise_balls
+from ...geometry.lines import measure_line_distance
 from ...geometry.vectors import Array, cross, dot
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism import Joint, JointType, Mechanism
 from ...mechanism.legs import LegDecomposition
-from ...tolerances import EXACT, FOLLOWED
+from ...tolerances import EXACT_INCIDENCE_TOL, HIDDEN_ROBOT_RESIDUAL_TOL
 from .path_segments import PathCoordinates
 
 
@@ -74,7 +74,7 @@ class SightVector:
         """Return the value for those of its parts."""
         if self.radius is None:
             one, other = parts
-            return unit_balls(cross(one, other))
+            return normalise_balls(cross(one, other))
         start, on, d = parts
         out = on - start
         foot = out - dot(out, d)[..., None] * d
@@ -86,25 +86,25 @@ class SightVector:
 VectorExpression = PlatformPoint | LegVector | DerivedVector | SightVector
 
 
-def value_of(each: VectorExpression, p: Field, R: Field, carried: Sequence[Field]) -> Field:
+def evaluate_expression(each: VectorExpression, p: Field, R: Field, carried: Sequence[Field]) -> Field:
     if isinstance(each, PlatformPoint):
         return each.value(p, R)
     if isinstance(each, LegVector):
         return np.asarray(each.sense * carried[each.limb] + each.offset)
     if isinstance(each, SightVector):
-        return each.value(*(value_of(part, p, R, carried) for part in each.parts))
-    along = value_of(each.end, p, R, carried) - value_of(each.start, p, R, carried)
-    return unit_balls(along if each.axis is None else cross(value_of(each.axis, p, R, carried), along))
+        return each.value(*(evaluate_expression(part, p, R, carried) for part in each.parts))
+    along = evaluate_expression(each.end, p, R, carried) - evaluate_expression(each.start, p, R, carried)
+    return normalise_balls(along if each.axis is None else cross(evaluate_expression(each.axis, p, R, carried), along))
 
 
-def limbs_of(each: Any) -> set[int]:
+def collect_subchains(each: Any) -> set[int]:
     """Return the subchains on whose vectors an expression, or what is made of expressions, depends."""
     if isinstance(each, LegVector):
         return {each.limb}
     parts = (
         each if isinstance(each, tuple) else [getattr(each, f.name) for f in fields(each)] if is_dataclass(each) else []
     )
-    return set().union(*map(limbs_of, parts))
+    return set().union(*map(collect_subchains, parts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,15 +139,15 @@ class JointRules:
         anchor = (frame[:3, :3] @ coordinates.motion.point + frame[:3, 3]) / length
         bodies = {mechanism.base: CarriedLink(PlatformPoint(False, np.zeros(3), np.zeros(3)), np.zeros(3), False)}
         known = cls(mechanism, length, bodies)
-        bodies[link] = CarriedLink(ORIGIN, anchor, _turns(mechanism, link, coordinates, configurations))
+        bodies[link] = CarriedLink(ORIGIN, anchor, _decide_rotation(mechanism, link, coordinates, configurations))
         reached = [link]
         for one in reached:
             for joint in mechanism.joints_of(one):
                 other = joint.other(one)
-                if other in decomposition.platform and other not in bodies and _points(joint):
+                if other in decomposition.platform and other not in bodies and _has_fixed_centre(joint):
                     rule = known.point(one, joint.point / length)
                     if rule is not None:
-                        turns = _turns(mechanism, other, coordinates, configurations)
+                        turns = _decide_rotation(mechanism, other, coordinates, configurations)
                         bodies[other] = CarriedLink(rule, joint.point / length, turns)
                         reached.append(other)
         return known
@@ -171,7 +171,7 @@ class JointRules:
         """Return the rule of a point (3,) (at zero, characteristic lengths) of a link that the pose carries."""
         body = self.bodies[link]
         arm = x - body.anchor
-        if np.linalg.norm(arm) <= EXACT:
+        if np.linalg.norm(arm) <= EXACT_INCIDENCE_TOL:
             return body.rule
         if body.turns is None:
             return None
@@ -188,7 +188,7 @@ class JointRules:
     def holders(self, feature: BodyPoint | BodyVector) -> tuple[str, ...]:
         """Return the links in which a point or direction is fixed."""
         value, found = self.zero(feature), [feature.link]
-        shared = self._same_point if isinstance(feature, BodyPoint) else _same_direction
+        shared = self._is_fixed_point if isinstance(feature, BodyPoint) else _is_fixed_direction
         for link in found:
             for joint in self.mechanism.joints_of(link):
                 if joint.other(link) not in found and shared(joint, value):
@@ -207,14 +207,14 @@ class JointRules:
             return 0.0
         a, b = self.zero(one), self.zero(other)
         for sense in (1.0, -1.0) if isinstance(one, BodyVector) else (1.0,):
-            if np.linalg.norm(a - sense * b) <= EXACT:
+            if np.linalg.norm(a - sense * b) <= EXACT_INCIDENCE_TOL:
                 return sense
         return 0.0
 
-    def _same_point(self, joint: Joint, x: Array) -> bool:
+    def _is_fixed_point(self, joint: Joint, x: Array) -> bool:
         if joint.type is JointType.REVOLUTE:
-            return distance(x, joint.point / self.length, joint.axis) <= EXACT
-        return _points(joint) and bool(np.linalg.norm(x - joint.point / self.length) <= EXACT)
+            return measure_line_distance(x, joint.point / self.length, joint.axis) <= EXACT_INCIDENCE_TOL
+        return _has_fixed_centre(joint) and bool(np.linalg.norm(x - joint.point / self.length) <= EXACT_INCIDENCE_TOL)
 
     def _rotate(self, vector: Array) -> Array:
         """Return a vector at zero in the platform's frame."""
@@ -222,24 +222,24 @@ class JointRules:
         return np.asarray(self.mechanism.links[link].pose[:3, :3].T @ vector)
 
 
-def _points(joint: Joint) -> bool:
+def _has_fixed_centre(joint: Joint) -> bool:
     """Return True if a joint's centre is fixed in both its links."""
     return joint.type in (JointType.REVOLUTE, JointType.UNIVERSAL, JointType.SPHERICAL, JointType.FIXED)
 
 
-def _same_direction(joint: Joint, d: Array) -> bool:
+def _is_fixed_direction(joint: Joint, d: Array) -> bool:
     if joint.type in (JointType.PRISMATIC, JointType.FIXED):
         return True
     along = joint.type in (JointType.REVOLUTE, JointType.CYLINDRICAL, JointType.PLANAR)
-    return along and bool(np.linalg.norm(np.cross(joint.axis, d)) <= EXACT)
+    return along and bool(np.linalg.norm(np.cross(joint.axis, d)) <= EXACT_INCIDENCE_TOL)
 
 
-def _turns(
+def _decide_rotation(
     mechanism: Mechanism, link: str, coordinates: PathCoordinates, configurations: Sequence[ClosedConfiguration]
 ) -> bool | None:
     zero, platform = mechanism.links[link].pose[:3, :3], mechanism.links[coordinates.motion.link].pose[:3, :3]
     turns = np.array([at.pose(link)[:3, :3] @ zero.T for at in configurations])
-    if np.max(np.abs(turns - np.eye(3))) < FOLLOWED:
+    if np.max(np.abs(turns - np.eye(3))) < HIDDEN_ROBOT_RESIDUAL_TOL:
         return False
     with_it = np.array([at.pose(coordinates.motion.link)[:3, :3] @ platform.T for at in configurations])
-    return True if coordinates.turning and np.max(np.abs(turns - with_it)) < FOLLOWED else None
+    return True if coordinates.turning and np.max(np.abs(turns - with_it)) < HIDDEN_ROBOT_RESIDUAL_TOL else None

@@ -45,7 +45,7 @@ class BranchCell(Value, all_recorded=True):
         """The cell's middle (n,)."""
         return np.asarray((self.low + self.high) / 2)
 
-    def holds(self, q: Array) -> bool:
+    def has_motor_values(self, q: Array) -> bool:
         """Return True if motor coordinates (n,) lie in the cell."""
         return bool(np.all(self.low <= q) and np.all(q <= self.high))
 
@@ -129,7 +129,7 @@ class BranchPart(Value):
     def find(self, q: Sequence[float] | Array) -> BranchCell | None:
         """The cell that contains motor coordinates (n,), in the order of ``motors``; None outside of what is proved."""
         at = np.asarray(q, dtype=float)
-        return next((cell for cell in self.cells if cell.holds(at)), None)
+        return next((cell for cell in self.cells if cell.has_motor_values(at)), None)
 
     turns_record = Shown(
         dict[str, bool],

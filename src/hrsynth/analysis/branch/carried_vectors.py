@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...geometry.affine import AffineForms, cross_product, dot_product, stack
+from ...geometry.affine import AffineForms, compute_cross_forms, compute_dot_forms, stack
 from ...geometry.vectors import Array
 from .loops import JointLoop, LoopRow, LoopSystem, Swept, rotate
 
@@ -56,7 +56,7 @@ class Product:
     @property
     def value(self) -> Any:
         """x · y − constant, (…)."""
-        return dot_product(self.x.value, self.y.value) - self.constant
+        return compute_dot_forms(self.x.value, self.y.value) - self.constant
 
 
 class SweptChains:
@@ -88,7 +88,10 @@ class SweptChains:
             swept, axes, points, slides = self._chain(chain)
             at = swept.at(p)
             self._known[key] = CarriedVector(
-                at, _parts(chain, lambda: cross_product(axes, at[..., None, :] - points) + slides, axes)
+                at,
+                _split_chain_columns(
+                    chain, lambda: compute_cross_forms(axes, at[..., None, :] - points) + slides, axes
+                ),
             )
         return self._known[key]
 
@@ -96,14 +99,14 @@ class SweptChains:
         """A direction (3,), as it is at zero, behind a chain."""
         swept, axes, *_ = self._chain(chain)
         v = rotate(swept.R, d)
-        return CarriedVector(v, _parts(chain, lambda: cross_product(axes, v[..., None, :]), axes))
+        return CarriedVector(v, _split_chain_columns(chain, lambda: compute_cross_forms(axes, v[..., None, :]), axes))
 
 
-def _parts(chain: tuple[int, ...], columns: Callable[[], Any], axes: Any) -> tuple[ChainColumns, ...]:
+def _split_chain_columns(chain: tuple[int, ...], columns: Callable[[], Any], axes: Any) -> tuple[ChainColumns, ...]:
     return (ChainColumns(np.array(chain, dtype=np.intp), columns(), axes),) if chain else ()
 
 
-def row_product(carrier: SweptChains, loop: JointLoop, row: LoopRow) -> Product:
+def build_row_product(carrier: SweptChains, loop: JointLoop, row: LoopRow) -> Product:
     """An equation of a loop as a product that vanishes."""
     if row.kind == "direction":
         assert row.one is not None
@@ -146,7 +149,7 @@ def add_slope(total: Total, product: Product, weight: Any = 1.0) -> None:
     """Add weight ∇(x · y) to a sum (c, N)."""
     for vector, other in ((product.x, product.y), (product.y, product.x)):
         for part in vector.parts:
-            f = other.value * (part.sign * _as_column(weight))
+            f = other.value * (part.sign * _convert_to_column(weight))
             total.add((part.places,), (part.columns * f[..., None, :]).sum(-1))
 
 
@@ -154,38 +157,38 @@ def add_bend(total: Total, product: Product, weight: Any = 1.0) -> None:
     """Add weight ∇²(x · y) to a sum (c, N, N)."""
     for vector, other in ((product.x, product.y), (product.y, product.x)):
         for part in vector.parts:
-            f = other.value * (part.sign * _as_column(weight))
-            pushed = cross_product(f[..., None, :], part.axes)
-            later, (upper, lower) = outer(pushed, part.columns), _triangles(len(part.places))
-            total.add(np.ix_(part.places, part.places), later * upper + _transpose(later) * lower)
+            f = other.value * (part.sign * _convert_to_column(weight))
+            pushed = compute_cross_forms(f[..., None, :], part.axes)
+            later, (upper, lower) = compute_outer_product(pushed, part.columns), _make_triangle_masks(len(part.places))
+            total.add(np.ix_(part.places, part.places), later * upper + _swap_last_axes(later) * lower)
     for one in product.x.parts:
         for two in product.y.parts:
             both = one.sign * two.sign
-            columns = two.columns * _as_column(_as_column(weight)) * both
-            across = outer(one.columns, columns)
+            columns = two.columns * _convert_to_column(_convert_to_column(weight)) * both
+            across = compute_outer_product(one.columns, columns)
             total.add(np.ix_(one.places, two.places), across)
-            total.add(np.ix_(two.places, one.places), _transpose(across))
+            total.add(np.ix_(two.places, one.places), _swap_last_axes(across))
 
 
 @cache
-def _triangles(size: int) -> tuple[Array, Array]:
+def _make_triangle_masks(size: int) -> tuple[Array, Array]:
     """Ones on and above the diagonal of a matrix, and below it."""
     upper = np.triu(np.ones((size, size)))
     return upper, 1.0 - upper
 
 
-def outer(a: Any, b: Any) -> Any:
+def compute_outer_product(a: Any, b: Any) -> Any:
     """The products a_i · b_j (…, k, l) of vectors (…, k, 3) and (…, l, 3)."""
     if isinstance(a, AffineForms) or isinstance(b, AffineForms):
         return (a[..., :, None, :] * b[..., None, :, :]).sum(-1)
     return a @ np.swapaxes(b, -1, -2)
 
 
-def _transpose(a: Any) -> Any:
+def _swap_last_axes(a: Any) -> Any:
     """Matrices or forms (…, k, l) with the last two dimensions in turn."""
     return a.transposed() if isinstance(a, AffineForms) else np.swapaxes(a, -1, -2)
 
 
-def _as_column(weight: Any) -> Any:
+def _convert_to_column(weight: Any) -> Any:
     """A weight (c,) for vectors (c, 3); numbers as they are."""
     return weight if isinstance(weight, int | float) else weight[..., None]

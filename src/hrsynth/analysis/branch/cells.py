@@ -20,12 +20,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...budgets import TUBE_RADII, TUBE_WIDER
-from ...geometry.affine import AffineForms, affine, combine, dot_product, stack
+from ...budgets import TUBE_RADII_COUNT, TUBE_WIDENING_FRACTION
+from ...geometry.affine import AffineForms, combine, compute_dot_forms, make_affine, stack
 from ...geometry.vectors import Array, times
-from ...tolerances import AFFINE_ROUNDING, THINNEST_CELL, THINNEST_TUBE
+from ...tolerances import AFFINE_ROUNDING, CELL_TUBE_RADIUS_MIN, TUBE_RADIUS_MIN
 from .loop_parts import LoopBlock, LoopEquation, LoopPart
-from .loops import CouplingEquation, JointLoop, LoopRow, residuals, rod_ends
+from .loops import CouplingEquation, JointLoop, LoopRow, evaluate_residuals, locate_rod_ends
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class BranchTube:
         """The middle of the tube (p,) at q (n,)."""
         return np.asarray(self.x + self.slopes @ (q - self.centre))
 
-    def lies_in(self, other: BranchTube) -> bool:
+    def is_inside(self, other: BranchTube) -> bool:
         """Return True if the tube lies inside another tube, whose cell contains its own."""
         off = np.abs(self.x - other.at(self.centre)) + np.abs(self.slopes - other.slopes) @ self.half + self.radius
         return bool(np.all(off < other.radius * (1 - AFFINE_ROUNDING)))
@@ -89,9 +89,9 @@ class TubeTrial:
         for k, i in enumerate(self.part.driven):
             own = np.zeros((len(self.x), count))
             own[:, k] = self.half[:, k]
-            found[i] = affine(self.centre[:, k], own, np.zeros(len(own)), bend.get(i))
+            found[i] = make_affine(self.centre[:, k], own, np.zeros(len(own)), bend.get(i))
         for k, i in enumerate(self.part.unknowns):
-            found[i] = affine(self.x[:, k], spread[:, k], radius[:, k] + rounding[:, k], bend.get(i))
+            found[i] = make_affine(self.x[:, k], spread[:, k], radius[:, k] + rounding[:, k], bend.get(i))
         return found
 
 
@@ -108,7 +108,7 @@ def prove_all(part: LoopPart, centres: Array, halves: Array, xs: Array) -> list[
         np.full(count, np.inf),
         np.ones(count, dtype=bool),
     )
-    for layer in layers(part.blocks):
+    for layer in group_blocks_by_depth(part.blocks):
         _prove_layer(trial, layer)
         if not trial.alive.any():
             break
@@ -120,7 +120,7 @@ def prove_all(part: LoopPart, centres: Array, halves: Array, xs: Array) -> list[
     ]
 
 
-def trial_of(part: LoopPart, tubes: Sequence[BranchTube]) -> TubeTrial:
+def stack_tubes(part: LoopPart, tubes: Sequence[BranchTube]) -> TubeTrial:
     """Proved tubes together."""
     centre, half, x, slopes, radius = (
         np.array([getattr(tube, name) for tube in tubes]) for name in ("centre", "half", "x", "slopes", "radius")
@@ -129,7 +129,7 @@ def trial_of(part: LoopPart, tubes: Sequence[BranchTube]) -> TubeTrial:
     return TubeTrial(part, centre, half, x, slopes, radius, weakest, np.ones(len(tubes), dtype=bool))
 
 
-def layers(blocks: Sequence[LoopBlock]) -> list[list[LoopBlock]]:
+def group_blocks_by_depth(blocks: Sequence[LoopBlock]) -> list[list[LoopBlock]]:
     """Blocks in order; those that turn rods, which need not know of each other, together."""
     return [*([block] for block in blocks if block.loop is None), *([block] for block in blocks if block.loop)]
 
@@ -149,24 +149,24 @@ def _prove_layer(trial: TubeTrial, layer: Sequence[LoopBlock]) -> None:
 def _prove_block(trial: TubeTrial, block: LoopBlock) -> None:
     """As above for one block."""
     own = [trial.part.place[i] for i in block.unknowns]
-    equations = block.equations if block.loop is None else turning(trial, block)
-    at = derivatives(trial, equations, own, trial.radius)
+    equations = block.equations if block.loop is None else list_rotating_equations(trial, block)
+    at = evaluate_derivatives(trial, equations, own, trial.radius)
     A = at.by_own
-    Y = inverses(A.v[0])
+    Y = invert_matrices(A.v[0])
     # Y G along x̃, as a whole and in mean value form: both hold, the sharper one counts
     e = (
-        combine(Y, residual(trial, equations)).size
-        + drift(combine(Y, at.along))
+        combine(Y, evaluate_residual(trial, equations)).size
+        + bound_drift(combine(Y, at.along))
         + times(combine(Y, at.by_others).size, trial.radius)
     )
     e = np.fmin(e, combine(Y, at.values).size)
     one = np.eye(len(own))
     done = np.zeros(len(e), dtype=bool)
     radius = trial.radius.copy()
-    thinnest = np.where(trial.half.any(axis=-1), THINNEST_CELL, THINNEST_TUBE)[:, None]
-    for attempt in range(TUBE_RADII):
+    thinnest = np.where(trial.half.any(axis=-1), CELL_TUBE_RADIUS_MIN, TUBE_RADIUS_MIN)[:, None]
+    for attempt in range(TUBE_RADII_COUNT):
         if attempt:
-            at = derivatives(trial, equations, own, radius)
+            at = evaluate_derivatives(trial, equations, own, radius)
         M = (one - combine(Y, at.by_own)).size
         r = radius[:, own]
         Mr = times(M, r)
@@ -174,20 +174,22 @@ def _prove_block(trial: TubeTrial, block: LoopBlock) -> None:
         if fits.any():
             trial.radius[np.ix_(fits, own)] = r[fits]
             if block.loop is None:
-                trial.weakest[fits] = np.minimum(trial.weakest[fits], _weakest(Y[fits], M[fits], r[fits], Mr[fits]))
+                trial.weakest[fits] = np.minimum(
+                    trial.weakest[fits], _bound_smallest_value(Y[fits], M[fits], r[fits], Mr[fits])
+                )
             done |= fits
         good = np.all(np.isfinite(M), axis=(-1, -2)) & np.all(np.isfinite(e), axis=-1) & ~done
         possible = good & (np.abs(np.linalg.eigvals(np.where(good[:, None, None], M, one))).max(axis=-1) < 1)
         if not possible.any():
             break
         wanted = np.linalg.solve(one - M[possible], e[possible][..., None])[..., 0]
-        radius[np.ix_(possible, own)] = np.maximum(TUBE_WIDER * wanted, thinnest[possible])
+        radius[np.ix_(possible, own)] = np.maximum(TUBE_WIDENING_FRACTION * wanted, thinnest[possible])
     trial.alive &= done
     if block.loop is not None:
-        trial.alive &= _same_side(trial, block)
+        trial.alive &= _check_same_side(trial, block)
 
 
-def _weakest(Y: Array, M: Array, r: Array, Mr: Array) -> Array:
+def _bound_smallest_value(Y: Array, M: Array, r: Array, Mr: Array) -> Array:
     """A lower bound (c,) of the smallest singular value of all A (c, k, k) with |1 − Y A| ≤ M, where M r < r.
 
     |A⁻¹| ≤ (1 − M)⁻¹ |Y| = Z + (1 − M)⁻¹ R, entry by entry, for any Z and R = |Y| − (1 − M) Z. Columns of |R| are at
@@ -201,7 +203,7 @@ def _weakest(Y: Array, M: Array, r: Array, Mr: Array) -> Array:
     return np.asarray((1 - AFFINE_ROUNDING) / norm)
 
 
-def inverses(A: Array) -> Array:
+def invert_matrices(A: Array) -> Array:
     """Approximate inverses (c, p, p), pseudo-inverses where one has none."""
     try:
         return np.asarray(np.linalg.inv(A))
@@ -209,14 +211,14 @@ def inverses(A: Array) -> Array:
         return np.asarray(np.linalg.pinv(np.nan_to_num(A)))
 
 
-def middles(low: Array, high: Array) -> tuple[Array, Array]:
+def split_cells(low: Array, high: Array) -> tuple[Array, Array]:
     """The middles of cells and, rounded up, how far their sides are from these."""
     centre = (low + high) / 2
     half = np.maximum(high - centre, centre - low)
     return centre, half + 2 * np.spacing(np.abs(centre) + half)
 
 
-def drift(B: AffineForms) -> Array:
+def bound_drift(B: AffineForms) -> Array:
     """A bound (c, k) of ∫₀¹ B(tε) ε dt for forms B (c, k, n): of Σ (b_i + ½ Σ s_ij ε_j) ε_i ± r_i, j ≤ n; r_i holds
     the other symbols."""
     s = np.moveaxis(B.v[1 : 1 + B.r.shape[-1]], 0, -1)
@@ -256,27 +258,30 @@ def evaluate_equations(
         loop = equations[members[0]].of
         rows = [row for row in (equations[k].row for k in members) if row is not None]
         assert isinstance(loop, JointLoop)
-        found = residuals(part.system, loop, forms, rows)
+        found = evaluate_residuals(part.system, loop, forms, rows)
         for k, value, slope in zip(members, *found, strict=True):
             values[k], slopes[k] = value, slope
     return values, slopes
 
 
-def residual(trial: TubeTrial, equations: Sequence[LoopEquation]) -> AffineForms:
+def evaluate_residual(trial: TubeTrial, equations: Sequence[LoopEquation]) -> AffineForms:
     """G(q_c, x_c), (c, k)."""
     still = trial.kept(slice(None))
     still.half = 0.0 * still.half
     return stack(
-        [_zero(trial) + each for each in evaluate_equations(trial.part, equations, still.forms(0.0 * trial.radius))[0]]
+        [
+            _make_zero_form(trial) + each
+            for each in evaluate_equations(trial.part, equations, still.forms(0.0 * trial.radius))[0]
+        ]
     )
 
 
-def derivatives(
+def evaluate_derivatives(
     trial: TubeTrial, equations: Sequence[LoopEquation], own: Sequence[int], radius: Array
 ) -> TubeDerivatives:
     """The derivatives of equations over tubes with radii (c, p)."""
     part = trial.part
-    zero = _zero(trial)
+    zero = _make_zero_form(trial)
     values, slopes = evaluate_equations(part, equations, trial.forms(radius))
     by_own = [stack([zero + slope.get(part.unknowns[k], 0.0) for k in own]) for slope in slopes]
     others = [i for k, i in enumerate(part.unknowns) if k not in own]
@@ -300,16 +305,16 @@ def derivatives(
     return TubeDerivatives(made, stack(by_own, axis=-2), stack(by_others, axis=-2), stack(along, axis=-2))
 
 
-def _zero(trial: TubeTrial) -> AffineForms:
+def _make_zero_form(trial: TubeTrial) -> AffineForms:
     """Zero for all cells."""
-    return affine(np.zeros(len(trial.x)), np.zeros((len(trial.x), trial.symbols[1])), np.zeros(len(trial.x)))
+    return make_affine(np.zeros(len(trial.x)), np.zeros((len(trial.x), trial.symbols[1])), np.zeros(len(trial.x)))
 
 
-def turning(trial: TubeTrial, block: LoopBlock) -> tuple[LoopEquation, ...]:
+def list_rotating_equations(trial: TubeTrial, block: LoopBlock) -> tuple[LoopEquation, ...]:
     """The equations that turn a rod to where its loop closes: none across its direction at the cell's middle."""
     loop = block.loop
     assert loop is not None
-    a, _, A = rod_ends(trial.part.system, loop, trial.part.values(trial.centre, trial.x))
+    a, _, A = locate_rod_ends(trial.part.system, loop, trial.part.values(trial.centre, trial.x))
     direction = np.broadcast_to(a - A, (len(trial.x), 3))
     if len(block.unknowns) == 1:
         axis = trial.part.system.coordinates[block.unknowns[0]].axis
@@ -318,16 +323,16 @@ def turning(trial: TubeTrial, block: LoopBlock) -> tuple[LoopEquation, ...]:
     return tuple(LoopEquation(loop, LoopRow("point", across[:, k]), swings=True) for k in (1, 2))
 
 
-def _same_side(trial: TubeTrial, block: LoopBlock) -> NDArray[np.bool_]:
+def _check_same_side(trial: TubeTrial, block: LoopBlock) -> NDArray[np.bool_]:
     """Mask (c,) of tubes over which both ends of a rod's loop lie on one side of its centre: two points equally far
     from it and equal across one direction then coincide."""
     assert block.loop is not None
     system = trial.part.system
-    a, _, A = rod_ends(system, block.loop, trial.part.values(trial.centre, trial.x))
+    a, _, A = locate_rod_ends(system, block.loop, trial.part.values(trial.centre, trial.x))
     direction = a - A
-    ends = rod_ends(system, block.loop, trial.forms(trial.radius))
+    ends = locate_rod_ends(system, block.loop, trial.forms(trial.radius))
     found = np.ones(len(trial.x), dtype=bool)
     for end in ends[:2]:
-        along = dot_product(end - ends[2], direction)
+        along = compute_dot_forms(end - ends[2], direction)
         found &= along.v[0] - along.spread > 0
     return found

@@ -7,41 +7,41 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...geometry.vectors import Array
-from ...tolerances import AFFINE_ROUNDING, TOGGLE, TOGGLE_JOINT
+from ...tolerances import AFFINE_ROUNDING, TOGGLE_RATE_MIN_FRACTION, TOGGLE_SINGULAR_VALUE_FRACTION
 from .answer import Toggle
 from .cells import BranchTube, prove_all
 from .growth import BranchEnd, Growth
 from .loop_parts import LoopPart
 
-HALVINGS = 40
+TOGGLE_BISECTIONS_COUNT = 40
 """Number of bisections of the path to a toggle."""
-BEYOND = 20.0
+TOGGLE_SEARCH_RANGE_FRACTION = 20.0
 """Search range of a toggle from the start of a cell, as a multiple of the distance to its middle."""
-TOLD = 4
+TOGGLE_SEARCH_ENDS_COUNT = 4
 """Ends of the proof that are looked into, those of the largest cells first, for each set of joints."""
 
 
-def toggles(growth: Growth) -> tuple[Toggle, ...]:
+def find_toggles(growth: Growth) -> tuple[Toggle, ...]:
     """The ends of a proof, one for each set of joints that can move there."""
     ends = sorted(growth.endings, key=lambda end: -end.leaf.volume)
-    some = ends[:: max(1, len(ends) // (TOLD * len(growth.q0) * 2))]
+    some = ends[:: max(1, len(ends) // (TOGGLE_SEARCH_ENDS_COUNT * len(growth.q0) * 2))]
     found: dict[tuple[str, ...], Toggle] = {}
-    for toggle in _toggles(growth, some) if some else ():
+    for toggle in _search_toggles(growth, some) if some else ():
         found.setdefault(toggle.joints, toggle)
     return tuple(found.values())
 
 
-def _toggles(growth: Growth, ends: Sequence[BranchEnd]) -> Iterator[Toggle]:
+def _search_toggles(growth: Growth, ends: Sequence[BranchEnd]) -> Iterator[Toggle]:
     """Go from where cells were started through their middles and on, all together; where that ends, a loop toggles."""
     part = growth.part
     unit = part.system.units[list(part.driven)]
     start, x0 = np.array([end.q for end in ends]), np.array([end.x for end in ends])
     middle = np.array([(growth.grid.point(end.leaf.low) + growth.grid.point(end.leaf.high)) / 2 for end in ends])
-    goal = np.clip(start + BEYOND * (middle - start), growth.grid.low, growth.grid.high)
+    goal = np.clip(start + TOGGLE_SEARCH_RANGE_FRACTION * (middle - start), growth.grid.low, growth.grid.high)
     home = np.linalg.svd(part.closure(growth.q0, growth.x0)[1], compute_uv=False)[-1]
     for end, q, x, last in zip(ends, *_follow_ways(part, start, x0, goal), strict=True):
         _, strengths, rows = np.linalg.svd(part.closure(q, x)[1])
-        if last == 1.0 or strengths[-1] / max(home, 1e-300) > TOGGLE:
+        if last == 1.0 or strengths[-1] / max(home, 1e-300) > TOGGLE_SINGULAR_VALUE_FRACTION:
             why = (
                 "not tried: the cell limit was reached (use a smaller --box or more --max-cells)"
                 if not end.leaf.failed
@@ -49,7 +49,7 @@ def _toggles(growth: Growth, ends: Sequence[BranchEnd]) -> Iterator[Toggle]:
             )
             yield Toggle(q * unit, (), (), why)
             continue
-        moving = np.abs(rows[-1]) > TOGGLE_JOINT * np.abs(rows[-1]).max()
+        moving = np.abs(rows[-1]) > TOGGLE_RATE_MIN_FRACTION * np.abs(rows[-1]).max()
         places = [i for i, moves in zip(part.unknowns, moving, strict=True) if moves]
         joints = tuple(dict.fromkeys(part.system.coordinates[i].joint for i in places))
         loops = tuple(loop.name for loop in part.loops if set(places).intersection(loop.coordinates))
@@ -62,7 +62,7 @@ def _follow_ways(part: LoopPart, q: Array, x: Array, goal: Array) -> tuple[Array
     """The last closed configurations (c, n), (c, p) on the straight ways to ``goal`` that short steps reach, and their
     parts (c,) of the ways."""
     x, done, step = x.copy(), np.zeros(len(q)), np.full(len(q), 0.25)
-    for _ in range(HALVINGS):
+    for _ in range(TOGGLE_BISECTIONS_COUNT):
         on = np.flatnonzero(done < 1.0)
         if not len(on):
             break
@@ -78,7 +78,7 @@ def _follow_ways(part: LoopPart, q: Array, x: Array, goal: Array) -> tuple[Array
     return q + (goal - q) * done[:, None], x, done
 
 
-def turns(growth: Growth) -> tuple[tuple[str, bool], ...]:
+def list_full_turns(growth: Growth) -> tuple[tuple[str, bool], ...]:
     """For each motor with a full turn whose first and last face are proved throughout: True if the closures there
     agree, angles modulo 2π; not listed if neither is proved."""
     part, found = growth.part, []
@@ -89,19 +89,19 @@ def turns(growth: Growth) -> tuple[tuple[str, bool], ...]:
         first = [leaf for leaf in growth.proved if leaf.low[k] == 0]
         last = [leaf for leaf in growth.proved if leaf.high[k] == growth.whole]
         same = [
-            _meets(growth, k, one.tube, other.tube, face)
+            _check_tubes_meet(growth, k, one.tube, other.tube, face)
             for one in last
             for other in first
             for face in growth.opposite(k, one, other)
             if one.tube is not None and other.tube is not None
         ]
-        filled = growth.whole_face(k, first) and growth.whole_face(k, last)
+        filled = growth.is_face_covered(k, first) and growth.is_face_covered(k, last)
         if same and filled and (False in same or all(same)):
             found.append((part.system.names[i], False not in same))
     return tuple(found)
 
 
-def _meets(growth: Growth, k: int, one: BranchTube, other: BranchTube, face: Array) -> bool | None:
+def _check_tubes_meet(growth: Growth, k: int, one: BranchTube, other: BranchTube, face: Array) -> bool | None:
     """Return True if the closure of one tube at a point of the last face lies in another tube, a full turn before; None
     if neither is proved."""
     part = growth.part

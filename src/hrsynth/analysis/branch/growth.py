@@ -17,14 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...budgets import FINEST_BRANCH_CELL
+from ...budgets import BRANCH_CELL_INDEX_HALVINGS_MAX
 from ...geometry.vectors import Array
 from ...progress import report
 from ...tolerances import AFFINE_ROUNDING
-from .cells import BranchTube, middles, prove_all
+from .cells import BranchTube, prove_all, split_cells
 from .loop_parts import LoopPart
 
-AT_ONCE = 64
+BRANCH_CELLS_BATCH_COUNT = 64
 """Cells that are tried together."""
 Corner = NDArray[np.int64]
 
@@ -38,7 +38,7 @@ class CellGrid:
 
     def point(self, at: Any) -> Array:
         """The motor coordinates (n,) of a point given in whole numbers, or halves of them; ends of the box exactly."""
-        part = np.asarray(at, dtype=float) / 2.0**FINEST_BRANCH_CELL
+        part = np.asarray(at, dtype=float) / 2.0**BRANCH_CELL_INDEX_HALVINGS_MAX
         return np.asarray(np.where(part == 1.0, self.high, self.low + part * (self.high - self.low)))
 
 
@@ -60,24 +60,24 @@ class GrownCell:
     @property
     def volume(self) -> float:
         """Fraction of the box."""
-        return float(np.prod((self.high - self.low) / 2.0**FINEST_BRANCH_CELL))
+        return float(np.prod((self.high - self.low) / 2.0**BRANCH_CELL_INDEX_HALVINGS_MAX))
 
 
-def whole_box(n: int) -> list[GrownCell]:
+def make_whole_cell(n: int) -> list[GrownCell]:
     """The box of n motors as one cell."""
-    return [GrownCell(np.zeros(n, dtype=np.int64), np.full(n, 2**FINEST_BRANCH_CELL, dtype=np.int64))]
+    return [GrownCell(np.zeros(n, dtype=np.int64), np.full(n, 2**BRANCH_CELL_INDEX_HALVINGS_MAX, dtype=np.int64))]
 
 
-def lattice(grid: CellGrid, start: Array, half: Array, most: int) -> list[GrownCell]:
+def split_box(grid: CellGrid, start: Array, half: Array, most: int) -> list[GrownCell]:
     """The box as at most so many equal cells of sides 2 half (n,) about a start, as far as they go, the first with the
     start in its middle, and what lies beyond them on each side."""
     n = len(start)
-    scale = 2.0**FINEST_BRANCH_CELL / (grid.high - grid.low)
+    scale = 2.0**BRANCH_CELL_INDEX_HALVINGS_MAX / (grid.high - grid.low)
     middle, reach = np.rint((start - grid.low) * scale).astype(np.int64), np.floor(half * scale).astype(np.int64)
 
     def edges(k: int, rings: int) -> list[int]:
         every = {int(middle[k] + j * reach[k]) for j in range(-2 * rings - 1, 2 * rings + 2, 2)}
-        return sorted({min(max(each, 0), 2**FINEST_BRANCH_CELL) for each in every})
+        return sorted({min(max(each, 0), 2**BRANCH_CELL_INDEX_HALVINGS_MAX) for each in every})
 
     rings = [0] * n
     for ring in range(1, most):
@@ -91,9 +91,9 @@ def lattice(grid: CellGrid, start: Array, half: Array, most: int) -> list[GrownC
     cells = [GrownCell(*np.array(each, dtype=np.int64).T) for each in product(*sides)]
     cells.sort(key=lambda cell: bool(np.any(cell.low > middle) or np.any(cell.high < middle)))
     low, high = np.array([side[0][0] for side in sides]), np.array([side[-1][1] for side in sides])
-    outer_low, outer_high = np.zeros(n, dtype=np.int64), np.full(n, 2**FINEST_BRANCH_CELL, dtype=np.int64)
+    outer_low, outer_high = np.zeros(n, dtype=np.int64), np.full(n, 2**BRANCH_CELL_INDEX_HALVINGS_MAX, dtype=np.int64)
     for k in range(n):
-        for a, b in ((0, low[k]), (high[k], 2**FINEST_BRANCH_CELL)):
+        for a, b in ((0, low[k]), (high[k], 2**BRANCH_CELL_INDEX_HALVINGS_MAX)):
             if a < b:
                 beyond = GrownCell(outer_low.copy(), outer_high.copy(), beyond=True)
                 beyond.low[k], beyond.high[k] = a, b
@@ -135,10 +135,10 @@ class Growth:
         self.leaves[0].asked = True
         while waiting and self.tried < self.most:
             waiting.sort(key=lambda each: (each[0].depth, each[0].low.tolist()))
-            batch, waiting = waiting[:AT_ONCE], waiting[AT_ONCE:]
-            coarse = [each for each in batch if self._coarse(each[0])]
+            batch, waiting = waiting[:BRANCH_CELLS_BATCH_COUNT], waiting[BRANCH_CELLS_BATCH_COUNT:]
+            coarse = [each for each in batch if self._is_too_coarse(each[0])]
             if coarse:
-                waiting += [each for each in batch if not self._coarse(each[0])]
+                waiting += [each for each in batch if not self._is_too_coarse(each[0])]
                 waiting += [half for each in coarse for half in self._cut(*each)]
                 continue
             self.tried += len(batch)
@@ -159,17 +159,17 @@ class Growth:
     @property
     def share(self) -> float:
         """The volume of all proved cells, as part of the box: 1.0 for all of it alone."""
-        volume, whole = sum(_volume(leaf.high - leaf.low) for leaf in self.proved), self.whole ** len(self.q0)
+        volume, whole = sum(_compute_volume(leaf.high - leaf.low) for leaf in self.proved), self.whole ** len(self.q0)
         return 1.0 if volume == whole else min(volume / whole, 1 - 2.0**-50)
 
-    def _coarse(self, leaf: GrownCell) -> bool:
+    def _is_too_coarse(self, leaf: GrownCell) -> bool:
         return bool(np.max(leaf.high - leaf.low) / self.whole > self.coarsest) and leaf.depth < self.depth
 
     def _tubes(self, batch: Sequence[tuple[GrownCell, Array, Array]]) -> list[BranchTube | None]:
         """The tubes of cells, each about the closure at its middle that its start leads to."""
         low = np.array([self.grid.point(leaf.low) for leaf, *_ in batch])
         high = np.array([self.grid.point(leaf.high) for leaf, *_ in batch])
-        centre, half = middles(low, high)
+        centre, half = split_cells(low, high)
         q = np.array([q for _, q, _ in batch])
         x, closed = self.part.close(q, np.array([x for *_, x in batch]))
         starts, good = self.part.follow(q, x, centre)
@@ -251,7 +251,7 @@ class Growth:
     @property
     def whole(self) -> int:
         """The side of the box in whole numbers."""
-        return int(2**FINEST_BRANCH_CELL)
+        return int(2**BRANCH_CELL_INDEX_HALVINGS_MAX)
 
     def opposite(self, k: int, one: GrownCell, other: GrownCell) -> list[Array]:
         """The middle of what the far face of one cell and the near face of another have in common a whole turn apart,
@@ -261,9 +261,11 @@ class Growth:
         sides = np.delete(high - low, k)
         return [self.grid.point((low + high) / 2)] if np.all(sides > 0) else []
 
-    def whole_face(self, k: int, cells: Sequence[GrownCell]) -> bool:
+    def is_face_covered(self, k: int, cells: Sequence[GrownCell]) -> bool:
         """Return True if cells at a face across side k fill it."""
-        return sum(_volume(np.delete(leaf.high - leaf.low, k)) for leaf in cells) == self.whole ** (len(self.q0) - 1)
+        return sum(_compute_volume(np.delete(leaf.high - leaf.low, k)) for leaf in cells) == self.whole ** (
+            len(self.q0) - 1
+        )
 
     def _face(self, one: GrownCell, other: GrownCell) -> Array:
         """The middle of what two cells have in common."""
@@ -326,7 +328,7 @@ class Growth:
         return int(np.argmax(width * slopes))
 
 
-def largest_box(growth: Growth) -> tuple[Corner, Corner]:
+def find_largest_box(growth: Growth) -> tuple[Corner, Corner]:
     """A large box about the start in the union of the proved cells: grown side by side, as long as it is covered."""
     cells = [leaf for leaf in growth.proved]
     first = cells[0]
@@ -337,7 +339,7 @@ def largest_box(growth: Growth) -> tuple[Corner, Corner]:
     def covered(a: Corner, b: Corner) -> bool:
         common = np.minimum(highs, b) - np.maximum(lows, a)
         inside = np.all(common > 0, axis=1)
-        return sum(_volume(row) for row in common[inside]) == _volume(b - a)
+        return sum(_compute_volume(row) for row in common[inside]) == _compute_volume(b - a)
 
     moved = True
     while moved:
@@ -355,7 +357,7 @@ def largest_box(growth: Growth) -> tuple[Corner, Corner]:
     return low, high
 
 
-def _volume(sides: Corner) -> int:
+def _compute_volume(sides: Corner) -> int:
     found = 1
     for side in sides.tolist():
         found *= int(side)

@@ -22,12 +22,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...budgets import BACK_CELLS, BACK_SIDES, BACK_SIZES, BACK_TRIALS
-from ...geometry.affine import AffineForms, affine, combine, stack
+from ...budgets import (
+    INJECTIVITY_BOXES_MAX,
+    INJECTIVITY_CELLS_MAX,
+    INJECTIVITY_SIDE_STEPS_COUNT,
+    INJECTIVITY_TRIALS_MAX,
+)
+from ...geometry.affine import AffineForms, combine, make_affine, stack
 from ...geometry.vectors import Array
 from ...tolerances import AFFINE_ROUNDING
-from .cells import BranchTube, TubeTrial, derivatives, middles, prove_all, trial_of, turning
-from .growth import AT_ONCE, Growth, largest_box
+from .cells import (
+    BranchTube,
+    TubeTrial,
+    evaluate_derivatives,
+    list_rotating_equations,
+    prove_all,
+    split_cells,
+    stack_tubes,
+)
+from .growth import BRANCH_CELLS_BATCH_COUNT, Growth, find_largest_box
 from .loop_parts import LoopPart
 from .loops import LoopSystem, rotate
 
@@ -54,7 +67,7 @@ class PosedCells:
         wide = self.poses.spread + AFFINE_ROUNDING * (1 + np.abs(self.poses.v[0]))
         return self.poses.v[0] - wide, self.poses.v[0] + wide
 
-    def regular(self, which: Places) -> bool:
+    def has_regular_slopes(self, which: Places) -> bool:
         """Return True if |1 − Z F'| v < v with fixed Z, v > 0 over some cells together."""
         part = AffineForms(self.rates.v[:, which], self.rates.r[which])
         low, high = (part.v[0] + sign * part.spread for sign in (-1, 1))
@@ -77,17 +90,19 @@ class InjectivityProof:
     tried: int = 0
     known: dict[bytes, bool] = field(default_factory=dict)
 
-    def one_to_one(self, low: Array, high: Array) -> bool:
+    def is_injective(self, low: Array, high: Array) -> bool:
         """Return True if different motor values in a box are proved to have different poses."""
         own = self.cells.within(low, high)
         if not len(own):
             return False
-        if self._regular(own):
+        if self._has_regular_slopes(own):
             return True
         halves = self._halves(own, low, high)
-        return halves is not None and all(self.one_to_one(*half) for half in halves) and self.apart(*halves)
+        return (
+            halves is not None and all(self.is_injective(*half) for half in halves) and self.has_distinct_poses(*halves)
+        )
 
-    def apart(self, one: tuple[Array, Array], other: tuple[Array, Array]) -> bool:
+    def has_distinct_poses(self, one: tuple[Array, Array], other: tuple[Array, Array]) -> bool:
         """Return True if no motor values in one box have a pose of others in the other box."""
         own = [self.cells.within(*box) for box in (one, other)]
         self.tried += 1
@@ -98,17 +113,17 @@ class InjectivityProof:
         )
         if np.any(low > high_) or np.any(low_ > high):
             return True
-        if self._regular(self.cells.within(np.minimum(one[0], other[0]), np.maximum(one[1], other[1]))):
+        if self._has_regular_slopes(self.cells.within(np.minimum(one[0], other[0]), np.maximum(one[1], other[1]))):
             return True
         first = len(own[0]) >= len(own[1])
         halves = self._halves(own[0 if first else 1], *(one if first else other))
-        return halves is not None and all(self.apart(half, other if first else one) for half in halves)
+        return halves is not None and all(self.has_distinct_poses(half, other if first else one) for half in halves)
 
-    def _regular(self, which: Places) -> bool:
+    def _has_regular_slopes(self, which: Places) -> bool:
         key = which.tobytes()
-        if key not in self.known and self.tried < BACK_TRIALS:
+        if key not in self.known and self.tried < INJECTIVITY_TRIALS_MAX:
             self.tried += 1
-            self.known[key] = self.cells.regular(which)
+            self.known[key] = self.cells.has_regular_slopes(which)
         return self.known.get(key, False)
 
     def _halves(self, own: Places, low: Array, high: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]] | None:
@@ -119,7 +134,7 @@ class InjectivityProof:
             for face in faces[(faces > low[k]) & (faces < high[k])]:
                 uneven = abs(2 * face - low[k] - high[k]) / (high[k] - low[k])
                 best = min(best or (uneven, k, face), (uneven, k, face))
-        if best is None or self.tried >= BACK_TRIALS:
+        if best is None or self.tried >= INJECTIVITY_TRIALS_MAX:
             return None
         _, k, face = best
         below, above = high.copy(), low.copy()
@@ -137,7 +152,7 @@ def prove_injective_box(system: LoopSystem, grown: Sequence[Growth]) -> tuple[tu
         return None, False
     low, high = (
         np.concatenate(ends)
-        for ends in zip(*(map(growth.grid.point, largest_box(growth)) for growth in grown), strict=True)
+        for ends in zip(*(map(growth.grid.point, find_largest_box(growth)) for growth in grown), strict=True)
     )
     way = system.way(system.body[system.mechanism.platform])
     firsts = [0, *accumulate(len(growth.q0) for growth in grown)]
@@ -146,22 +161,22 @@ def prove_injective_box(system: LoopSystem, grown: Sequence[Growth]) -> tuple[tu
     place = np.argsort(order)
     home, free = np.concatenate([growth.q0 for growth in grown]), False
     cells: PosedCells | None = None
-    while _count(parts) <= BACK_CELLS:
-        cells = _pose_cells(system, way, parts)
-        free = free or all(cells.regular(np.array([k])) for k in range(len(cells.low)))
-        if free and InjectivityProof(cells).one_to_one(low, high):
+    while _count(parts) <= INJECTIVITY_CELLS_MAX:
+        cells = _bound_pose_cells(system, way, parts)
+        free = free or all(cells.has_regular_slopes(np.array([k])) for k in range(len(cells.low)))
+        if free and InjectivityProof(cells).is_injective(low, high):
             return (low[place], high[place]), True
-        if _count(parts) * 2 ** len(home) > BACK_CELLS:
+        if _count(parts) * 2 ** len(home) > INJECTIVITY_CELLS_MAX:
             break
         parts = [each.halved() for each in parts]
-    box = None if cells is None else _part(InjectivityProof(cells), home, low, high)
-    for size in 0.7 ** np.arange(1, BACK_SIZES) if box is None else ():  # fewer cells, which may be smaller
+    box = None if cells is None else _find_injective_box(InjectivityProof(cells), home, low, high)
+    for size in 0.7 ** np.arange(1, INJECTIVITY_BOXES_MAX) if box is None else ():  # fewer cells, which may be smaller
         a, b = home + size * (low - home), home + size * (high - home)
         parts = [each.within(a[own], b[own]) for each, own in zip(parts, sides, strict=True)]
-        while box is None and _count(parts) <= BACK_CELLS:
-            cells = _pose_cells(system, way, parts)
-            box = (a, b) if InjectivityProof(cells).one_to_one(a, b) else None
-            if _count(parts) * 2 ** len(home) > BACK_CELLS:
+        while box is None and _count(parts) <= INJECTIVITY_CELLS_MAX:
+            cells = _bound_pose_cells(system, way, parts)
+            box = (a, b) if InjectivityProof(cells).is_injective(a, b) else None
+            if _count(parts) * 2 ** len(home) > INJECTIVITY_CELLS_MAX:
                 break
             parts = [each.halved() for each in parts]
         if box is not None:
@@ -174,12 +189,12 @@ def _count(parts: Sequence[TubedCells]) -> int:
     return int(np.prod([len(each.tubes) for each in parts]))
 
 
-def _part(trial: InjectivityProof, home: Array, low: Array, high: Array) -> tuple[Array, Array] | None:
+def _find_injective_box(trial: InjectivityProof, home: Array, low: Array, high: Array) -> tuple[Array, Array] | None:
     """Return a large box about ``home``, part of another, in which different motor values have different poses: shrunk
     until it is proved, then enlarged side by side."""
     whole = np.array([low, high])
-    boxes = (home + size * (whole - home) for size in 0.7 ** np.arange(1, BACK_SIZES))
-    box = next((each for each in boxes if trial.one_to_one(each[0], each[1])), None)
+    boxes = (home + size * (whole - home) for size in 0.7 ** np.arange(1, INJECTIVITY_BOXES_MAX))
+    box = next((each for each in boxes if trial.is_injective(each[0], each[1])), None)
     if box is None:
         return None
 
@@ -188,10 +203,10 @@ def _part(trial: InjectivityProof, home: Array, low: Array, high: Array) -> tupl
 
     for side, k in np.ndindex(*whole.shape):
         least, most = 0.0, 2.0
-        for _ in range(BACK_SIDES):
+        for _ in range(INJECTIVITY_SIDE_STEPS_COUNT):
             wider, part = box.copy(), (least + most) / 2
             wider[side, k] = moved(side, k, part)
-            if trial.one_to_one(wider[0], wider[1]):
+            if trial.is_injective(wider[0], wider[1]):
                 least = part
             else:
                 most = part
@@ -235,7 +250,7 @@ class TubedCells:
             for side, end in ((0, self.low), (1, self.high))
         )
         old = [tube for tube in self.tubes for _ in sides]
-        centre, half = middles(low, high)
+        centre, half = split_cells(low, high)
         x = np.array([tube.at(q) for tube, q in zip(old, centre, strict=True)])
         new = prove_all(self.part, centre, half, self.part.close(centre, x)[0])
         return TubedCells(
@@ -244,18 +259,21 @@ class TubedCells:
             high,
             [
                 one
-                if one is not None and one.lies_in(tube)
+                if one is not None and one.is_inside(tube)
                 else BranchTube(c, h, at, tube.slopes, tube.radius + AFFINE_ROUNDING * (1 + np.abs(at)), tube.weakest)
                 for one, tube, c, h, at in zip(new, old, centre, half, x, strict=True)
             ],
         )
 
 
-def _pose_cells(system: LoopSystem, way: Sequence[int], cells: Sequence[TubedCells]) -> PosedCells:
+def _bound_pose_cells(system: LoopSystem, way: Sequence[int], cells: Sequence[TubedCells]) -> PosedCells:
     """Cells of all motors together."""
     parts = [SlopedPart.of(each.part, each.tubes) for each in cells]
     places = np.indices([len(each.tubes) for each in cells]).reshape(len(parts), -1)
-    found = [_over(system, way, parts, places[:, k : k + AT_ONCE]) for k in range(0, places.shape[1], AT_ONCE)]
+    found = [
+        _evaluate_poses(system, way, parts, places[:, k : k + BRANCH_CELLS_BATCH_COUNT])
+        for k in range(0, places.shape[1], BRANCH_CELLS_BATCH_COUNT)
+    ]
     poses, rates = (
         AffineForms(
             np.concatenate([each[k].v for each in found], axis=1), np.concatenate([each[k].r for each in found])
@@ -283,11 +301,13 @@ class SlopedPart:
     @classmethod
     def of(cls, part: LoopPart, tubes: Sequence[BranchTube]) -> SlopedPart:
         """Return those of tubes; infinite bounds where none is found."""
-        trial = trial_of(part, tubes)
+        trial = stack_tubes(part, tubes)
         equations = [
-            each for block in part.blocks for each in (block.equations if block.loop is None else turning(trial, block))
+            each
+            for block in part.blocks
+            for each in (block.equations if block.loop is None else list_rotating_equations(trial, block))
         ]
-        at = derivatives(trial, equations, range(len(part.unknowns)), trial.radius)
+        at = evaluate_derivatives(trial, equations, range(len(part.unknowns)), trial.radius)
         drift = AffineForms(
             at.along.v / trial.half[:, None, :], (at.along.r + AFFINE_ROUNDING * at.along.size) / trial.half[:, None, :]
         )
@@ -299,7 +319,7 @@ class SlopedPart:
         return cls(trial, at.by_own, drift, np.where(good, v, np.inf))
 
 
-def _over(
+def _evaluate_poses(
     system: LoopSystem, way: Sequence[int], parts: Sequence[SlopedPart], places: Places
 ) -> tuple[AffineForms, AffineForms]:
     """The platform's poses (c, 12) over cells of all motors, cell ``places`` (parts, c) of each part, and F'
@@ -319,7 +339,7 @@ def _over(
     swept = system.displacement(way, forms)
     centre = np.mean([joint.point for joint in system.mechanism.joints_of(system.mechanism.platform)], axis=0)
     p, columns = swept.at(centre / system.length), [rotate(swept.R, e) for e in np.eye(3)]
-    zero = affine(np.zeros(count), np.zeros((count, firsts[-1])), np.zeros(count))
+    zero = make_affine(np.zeros(count), np.zeros((count, firsts[-1])), np.zeros(count))
 
     def pose(vectors: Sequence[Any]) -> AffineForms:
         made: AffineForms = stack([zero + v[..., k] for v in vectors for k in range(3)])
@@ -333,8 +353,8 @@ def _over(
     found = []
     for k, each in enumerate(parts):
         part, S = each.trial.part, each.trial.slopes[places[k]]
-        y_x = _columns([rates.get(i, still) for i in part.unknowns])
-        along = _columns([rates.get(i, still) for i in part.driven])
+        y_x = _stack_columns([rates.get(i, still) for i in part.unknowns])
+        along = _stack_columns([rates.get(i, still) for i in part.driven])
         for i in set(part.unknowns).intersection(way):
             along = along + rates[i][..., None] * S[:, part.place[i]][:, None, :]
         # F' = y_q + y_x (S + E) − K (A (S + E) + B) for any K: with y_x A⁻¹ at the middle E counts in second order
@@ -349,7 +369,7 @@ def _over(
     )
 
 
-def _columns(vectors: Sequence[AffineForms]) -> AffineForms:
+def _stack_columns(vectors: Sequence[AffineForms]) -> AffineForms:
     """Vectors (c, 12) side by side, (c, 12, k)."""
     made: AffineForms = stack(vectors)
     return made

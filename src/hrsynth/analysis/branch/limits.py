@@ -15,7 +15,7 @@ from ...tolerances import AFFINE_ROUNDING
 from .answer import KEPT, OPEN, PASSED, UNSEEN, BranchLimit, BranchPart
 
 
-def branch_limits(
+def list_branch_limits(
     robot: Mechanism, motors: Sequence[str], parts: Sequence[BranchPart], held: Sequence[str]
 ) -> Iterator[BranchLimit]:
     """Return the limits of all joints without a motor, in the order of the file, with their verdicts over the proved

@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 
 from ...errors import BadRequest, MotorsNotEnough
-from ...geometry.ranks import spectrum
+from ...geometry.ranks import compute_matrix_spectrum
 from ...geometry.vectors import Array, times
 from ...results import Value
-from ...tolerances import NAMED, RANK_CUTOFF, SOLVED
-from .loops import CouplingEquation, JointLoop, LoopRow, LoopSystem, residuals
+from ...tolerances import CLOSURE_SOLVER_TOL, NAMED_TWIST_TOL, RANK_CUTOFF_FRACTION
+from .loops import CouplingEquation, JointLoop, LoopRow, LoopSystem, evaluate_residuals
 
 DISTANCE = LoopRow("distance")
-NEWTON_STEPS = 30
+LOOP_PART_NEWTON_STEPS_MAX = 30
 """Steps in which a part is closed at most."""
 
 
@@ -90,26 +90,26 @@ class LoopPart(Value):
     def closure(self, q: Array, x: Array) -> tuple[Array, Array, Array]:
         """All equations of its loops (…, m), and their derivatives by the unknowns (…, m, p) and by what drives it
         (…, m, n)."""
-        errors, rates = whole(self.system, self.loops, self.gears, self.values(q, x), q.shape[:-1])
+        errors, rates = evaluate_all_equations(self.system, self.loops, self.gears, self.values(q, x), q.shape[:-1])
         return errors, rates[..., list(self.unknowns)], rates[..., list(self.driven)]
 
     def close(self, q: Array, x: Array) -> tuple[Array, Array]:
         """The unknowns (c, p) near ``x`` at which the loops are closed, by Newton's method, and which (c,) are."""
         x = x.copy()
-        for _ in range(NEWTON_STEPS):
+        for _ in range(LOOP_PART_NEWTON_STEPS_MAX):
             errors, A, _ = self.closure(q, x)
-            far = np.linalg.norm(errors, axis=-1) >= SOLVED
+            far = np.linalg.norm(errors, axis=-1) >= CLOSURE_SOLVER_TOL
             if not far.any() or not np.all(np.isfinite(x)):
                 break
-            step = _least_squares(A[far], errors[far][..., None])[..., 0]
+            step = _solve_least_squares(A[far], errors[far][..., None])[..., 0]
             x[far] -= step * np.minimum(1.0, 0.5 / np.maximum(np.abs(step).max(axis=-1, initial=0.0), 0.5))[..., None]
-        done = np.linalg.norm(self.closure(q, x)[0], axis=-1) < 100 * SOLVED
+        done = np.linalg.norm(self.closure(q, x)[0], axis=-1) < 100 * CLOSURE_SOLVER_TOL
         return x, done & np.all(np.isfinite(x), axis=-1)
 
     def slopes(self, q: Array, x: Array) -> Array:
         """dx/dq (…, p, n) at closed configurations."""
         _, A, B = self.closure(q, x)
-        return -_least_squares(A, B)
+        return -_solve_least_squares(A, B)
 
     def follow(self, q: Array, x: Array, goal: Array, step: float = 0.1) -> tuple[Array, Array]:
         """The unknowns (c, p) at ``goal`` (c, n), reached by short steps from closed configurations, and which (c,) are
@@ -126,12 +126,12 @@ class LoopPart(Value):
         return x, good
 
 
-def _least_squares(A: Array, B: Array) -> Array:
+def _solve_least_squares(A: Array, B: Array) -> Array:
     """The least squares solutions (…, p, k) of A X = B, (…, m, p) and (…, m, k)."""
-    return np.asarray(np.linalg.pinv(A, rcond=RANK_CUTOFF) @ B)
+    return np.asarray(np.linalg.pinv(A, rcond=RANK_CUTOFF_FRACTION) @ B)
 
 
-def whole(
+def evaluate_all_equations(
     system: LoopSystem,
     loops: Sequence[JointLoop],
     gears: Sequence[CouplingEquation],
@@ -144,7 +144,7 @@ def whole(
     errors, rates = np.zeros((*shape, count)), np.zeros((*shape, count, len(values)))
     place = 0
     for loop in loops:
-        for value, slope in zip(*residuals(system, loop, values, loop.rows), strict=True):
+        for value, slope in zip(*evaluate_residuals(system, loop, values, loop.rows), strict=True):
             errors[..., place] = value
             for i, rate in slope.items():
                 rates[..., place, i] = rate
@@ -158,22 +158,22 @@ def whole(
     return errors, rates
 
 
-def parts_of(system: LoopSystem) -> tuple[tuple[LoopPart, ...], tuple[int, ...]]:
+def split_loop_system(system: LoopSystem) -> tuple[tuple[LoopPart, ...], tuple[int, ...]]:
     """Return the parts of a system, and the coordinates that are constant: those that rotate only themselves
     (internal), and those of loops without a motor. Raises ``MotorsNotEnough`` if the platform can move while all motors
     are fixed, ``BadRequest`` if motors depend on each other."""
-    held = _idle(system)
+    held = _find_internal_coordinates(system)
     unknowns = [i for i, each in enumerate(system.coordinates) if not each.driven and i not in held]
-    parts = [_part(system, group) for group in _groups(system, unknowns)]
+    parts = [_build_part(system, group) for group in _group_unknowns(system, unknowns)]
     held |= {i for part in parts if not part.driven for i in part.unknowns}
     return tuple(part for part in parts if part.driven), tuple(sorted(held))
 
 
-def _idle(system: LoopSystem) -> set[int]:
+def _find_internal_coordinates(system: LoopSystem) -> set[int]:
     """Choose coordinates to fix, one for each motion at zero that leaves the platform and the motors fixed: of each the
     one with the largest share. Raises ``BadRequest`` if the motors are not independent at zero."""
     held: set[int] = set()
-    _, rates = whole(system, system.loops, system.gears, system.zero)
+    _, rates = evaluate_all_equations(system, system.loops, system.gears, system.zero)
     looped = {i for loop in system.loops for i in loop.coordinates}
     looped |= {i for gear in system.gears for i in (gear.first, gear.second)}
     # a ball on a rod spins about it
@@ -190,20 +190,20 @@ def _idle(system: LoopSystem) -> set[int]:
     held |= {i for i, each in enumerate(system.coordinates) if not each.driven and i not in looped}
     every = [i for i, each in enumerate(system.coordinates) if i in looped and (each.driven or i in free)]
     count = sum(system.coordinates[i].driven for i in every)
-    dependent = spectrum(rates[:, every]).rank.value - spectrum(rates[:, free]).rank.value
+    dependent = compute_matrix_spectrum(rates[:, every]).rank.value - compute_matrix_spectrum(rates[:, free]).rank.value
     if dependent:
         raise BadRequest(
             f"{system.mechanism.name}: only {count - dependent} of {count} motor coordinates are independent at zero",
             remedy=f"Choose {count - dependent} with --motors.",
         )
     while free:
-        kernel = spectrum(rates[:, free]).kernel
+        kernel = compute_matrix_spectrum(rates[:, free]).kernel
         if not kernel.shape[1]:
             break
-        moved = [_platform_moves(system, free, vector) for vector in kernel.T]
+        moved = [_is_platform_moving(system, free, vector) for vector in kernel.T]
         weights = np.abs(kernel).max(axis=1)
         if any(moved):
-            names = [system.coordinates[i].name for i, w in zip(free, weights, strict=True) if w > NAMED]
+            names = [system.coordinates[i].name for i, w in zip(free, weights, strict=True) if w > NAMED_TWIST_TOL]
             raise MotorsNotEnough(system.mechanism.name, names)
         i = free[int(np.argmax(weights))]
         held.add(i)
@@ -211,7 +211,7 @@ def _idle(system: LoopSystem) -> set[int]:
     return held
 
 
-def _platform_moves(system: LoopSystem, free: Sequence[int], rates: Array) -> bool:
+def _is_platform_moving(system: LoopSystem, free: Sequence[int], rates: Array) -> bool:
     """Return True if the platform moves at zero with rates of some coordinates."""
     by = dict(zip(free, rates, strict=True))
     spin, velocity = np.zeros(3), np.zeros(3)
@@ -222,10 +222,10 @@ def _platform_moves(system: LoopSystem, free: Sequence[int], rates: Array) -> bo
         else:
             spin = spin + rate * each.axis
             velocity = velocity + rate * np.cross(each.point, each.axis)
-    return float(np.linalg.norm([*spin, *velocity])) > NAMED
+    return float(np.linalg.norm([*spin, *velocity])) > NAMED_TWIST_TOL
 
 
-def _groups(
+def _group_unknowns(
     system: LoopSystem, unknowns: Sequence[int]
 ) -> list[tuple[list[int], list[JointLoop], list[CouplingEquation]]]:
     """Unknowns that equations connect, with those loops and couplings."""
@@ -248,12 +248,12 @@ def _groups(
     return found
 
 
-def _part(system: LoopSystem, group: tuple[list[int], list[JointLoop], list[CouplingEquation]]) -> LoopPart:
+def _build_part(system: LoopSystem, group: tuple[list[int], list[JointLoop], list[CouplingEquation]]) -> LoopPart:
     """The blocks of a group of unknowns: those that close rods by turning them come last."""
     from scipy.linalg import qr
 
     unknowns, every, gears = group
-    loops = [_as_cut(loop, unknowns) for loop in every]
+    loops = [_restore_loop_rows(loop, unknowns) for loop in every]
     asked = {i for loop in loops for i in loop.coordinates} | {i for gear in gears for i in (gear.first, gear.second)}
     driven = tuple(i for i in system.driven if i in asked)
     swung: dict[int, tuple[int, ...]] = {}
@@ -269,16 +269,18 @@ def _part(system: LoopSystem, group: tuple[list[int], list[JointLoop], list[Coup
     last = {i for own in swung.values() for i in own}
     main = [i for i in unknowns if i not in last]
     zero = system.zero
-    rates = np.array([_slope(system, each, zero) for each in candidates]).reshape(len(candidates), len(zero))[:, main]
+    rates = np.array([_derive_equation_slope(system, each, zero) for each in candidates]).reshape(
+        len(candidates), len(zero)
+    )[:, main]
     # independent equations at zero, the firmest first
     order = qr(rates.T, mode="r", pivoting=True)[1][: len(main)] if main else []
     chosen = [candidates[k] for k in sorted(order)]
     left_out = tuple(each for k, each in enumerate(candidates) if k not in order)
-    blocks = [*_triangular(system, main, chosen), *(LoopBlock(own, (), loops[place]) for place, own in swung.items())]
+    blocks = [*_order_blocks(system, main, chosen), *(LoopBlock(own, (), loops[place]) for place, own in swung.items())]
     return LoopPart(system, driven, tuple(unknowns), tuple(blocks), tuple(loops), tuple(gears), left_out)
 
 
-def _as_cut(loop: JointLoop, unknowns: Sequence[int]) -> JointLoop:
+def _restore_loop_rows(loop: JointLoop, unknowns: Sequence[int]) -> JointLoop:
     """Return a loop with all its equations if the joint that was left out cannot rotate its rod everywhere: a constant
     coordinate of it is no spin."""
     if loop.swung is None:
@@ -287,19 +289,19 @@ def _as_cut(loop: JointLoop, unknowns: Sequence[int]) -> JointLoop:
     return loop if turning == min(loop.swings, 2) else replace(loop, swung=None, swings=0)
 
 
-def _slope(system: LoopSystem, equation: LoopEquation, values: Array) -> Array:
+def _derive_equation_slope(system: LoopSystem, equation: LoopEquation, values: Array) -> Array:
     """The derivatives (N,) of an equation."""
     row = np.zeros(len(values))
     if isinstance(equation.of, CouplingEquation):
         row[equation.of.second], row[equation.of.first] = 1.0, -equation.of.ratio
         return row
     assert equation.row is not None
-    (slope,) = residuals(system, equation.of, values, [equation.row])[1]
+    (slope,) = evaluate_residuals(system, equation.of, values, [equation.row])[1]
     row[list(slope)] = list(slope.values())
     return row
 
 
-def _triangular(system: LoopSystem, unknowns: Sequence[int], equations: Sequence[LoopEquation]) -> list[LoopBlock]:
+def _order_blocks(system: LoopSystem, unknowns: Sequence[int], equations: Sequence[LoopEquation]) -> list[LoopBlock]:
     """The blocks of a square system that can be solved one after another: a matching of equations and unknowns, then
     the strong components of who needs whom (Dulmage and Mendelsohn)."""
     import networkx as nx

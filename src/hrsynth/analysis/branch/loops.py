@@ -18,13 +18,13 @@ import numpy as np
 
 from ...errors import BadMechanism
 from ...geometry import lines
-from ...geometry.affine import AffineForms, cross_product, dot_product
-from ...geometry.so3 import turns_about
-from ...geometry.vectors import Array, cross, frozen, hat, inverse, plane_axes, transform
+from ...geometry.affine import AffineForms, compute_cross_forms, compute_dot_forms
+from ...geometry.so3 import decompose_rotation
+from ...geometry.vectors import Array, build_plane_axes, cross, freeze_array, hat, invert_pose, transform
 from ...mechanism import Joint, JointType, Mechanism, graphs
-from ...mechanism.screws import elementary
+from ...mechanism.screws import split_elementary
 from ...results import Value
-from ...tolerances import ROUNDED_AXIS, SAME_POINT
+from ...tolerances import AXIS_COMPONENT_ROUNDING_TOL, POINT_DISTANCE_TOL
 
 _PREFERRED = {"F": 0, "6": 1, "P": 2, "R": 3, "C": 4, "U": 5, "E": 6, "S": 7}
 """Priority of joint types in the spanning tree."""
@@ -149,7 +149,7 @@ class LoopSystem(Value):
         """Return the system in metres; values that are zero up to rounding are zero."""
 
         def point(p: Array) -> Array:
-            return frozen(_drop_rounding(p * self.length))
+            return freeze_array(_drop_rounding(p * self.length))
 
         def row(each: LoopRow) -> LoopRow:
             return replace(
@@ -165,7 +165,7 @@ class LoopSystem(Value):
             coordinates=tuple(
                 replace(
                     each,
-                    axis=frozen(_drop_rounding(each.axis)),
+                    axis=freeze_array(_drop_rounding(each.axis)),
                     point=point(each.point),
                     zero=each.zero * (self.length if each.slides else 1.0),
                 )
@@ -192,17 +192,17 @@ class LoopSystem(Value):
     def read(self, pose: Callable[[str], Array]) -> Array:
         """The coordinates (N,) at which the links have their poses X_BL (4, 4), m; turns within half a one."""
         found = np.zeros(len(self.coordinates))
-        D = {i: pose(link) @ inverse(self.mechanism.links[link].pose) for link, i in self.body.items()}
+        D = {i: pose(link) @ invert_pose(self.mechanism.links[link].pose) for link, i in self.body.items()}
         for end in (i for i in D if i >= 0):
             own = [i for i in self.way(end) if self.coordinates[i].joint == self.coordinates[end].joint]
-            moved = inverse(D[self.coordinates[own[0]].parent]) @ D[end]
+            moved = invert_pose(D[self.coordinates[own[0]].parent]) @ D[end]
             centre = self.coordinates[end].point * self.length
             for i in own:
                 if self.coordinates[i].slides:
                     found[i] = self.coordinates[i].axis @ (transform(moved, centre) - centre) / self.length
             turns = [i for i in own if not self.coordinates[i].slides]
             if turns:
-                found[turns] = turns_about(np.array([self.coordinates[i].axis for i in turns]), moved[:3, :3])
+                found[turns] = decompose_rotation(np.array([self.coordinates[i].axis for i in turns]), moved[:3, :3])
         return found + self.zero
 
     def pose(self, link: str, values: Sequence[float] | Array) -> Array:
@@ -262,21 +262,21 @@ class Swept:
     def rate(self, k: int, p: Any) -> Any:
         """The velocity (…, 3) of a place p with the k-th coordinate."""
         at = self.points[k]
-        return self.axes[k] if at is None else cross_product(self.axes[k], p - at)
+        return self.axes[k] if at is None else compute_cross_forms(self.axes[k], p - at)
 
     def turned(self, k: int, v: Any) -> Any:
         """The rate (…, 3) of a direction v with the k-th coordinate, None where it is zero."""
-        return None if self.points[k] is None else cross_product(self.axes[k], v)
+        return None if self.points[k] is None else compute_cross_forms(self.axes[k], v)
 
 
 def _drop_rounding(directions: Array) -> Array:
     """Directions or points whose components that are zero but for rounding are zero."""
-    return np.where(np.abs(directions) < ROUNDED_AXIS, 0.0, directions)
+    return np.where(np.abs(directions) < AXIS_COMPONENT_ROUNDING_TOL, 0.0, directions)
 
 
 def rotate(R: Any, p: Any) -> Any:
     """R p (…, 3)."""
-    if _floats(R) and _floats(p):
+    if _is_float_data(R) and _is_float_data(p):
         return np.matmul(R, p[..., None])[..., 0]
     return (R * p[..., None, :]).sum(-1)
 
@@ -285,22 +285,22 @@ def _turn_frame(R: Any, axis: Array, angle: Any) -> Any:
     """R exp([a]ₓ θ) = R + R [a]ₓ sin θ + R [a]ₓ² (1 − cos θ)."""
     sine, cosine = angle.sines() if hasattr(angle, "sines") else (np.sin(angle), np.cos(angle))
     K = hat(axis)
-    once = _product(R, K)
-    return R + once * sine[..., None, None] + _product(R, K @ K) * (1 - cosine)[..., None, None]
+    once = _compute_product(R, K)
+    return R + once * sine[..., None, None] + _compute_product(R, K @ K) * (1 - cosine)[..., None, None]
 
 
-def _floats(x: Any) -> bool:
+def _is_float_data(x: Any) -> bool:
     return isinstance(x, np.ndarray) and x.dtype.kind == "f"
 
 
-def _product(R: Any, K: Array) -> Any:
+def _compute_product(R: Any, K: Array) -> Any:
     """R K for a matrix of numbers (3, 3)."""
-    if _floats(R):
+    if _is_float_data(R):
         return R @ K
     return (R[..., :, :, None] * K).sum(-2)
 
 
-def residuals(
+def evaluate_residuals(
     system: LoopSystem, loop: JointLoop, values: Any, rows: Sequence[LoopRow]
 ) -> tuple[list[Any], list[dict[int, Any]]]:
     """The values (…) of some equations of a loop, and of each the derivatives by the coordinates of its chains that are
@@ -315,28 +315,28 @@ def residuals(
         if row.kind == "point":
             assert row.one is not None
             k = rotate(one.R, row.one) if row.carried else row.one
-            found.append(dot_product(b - a, k))
+            found.append(compute_dot_forms(b - a, k))
             for place, i in moving[0]:
-                slope[i] = -dot_product(one.rate(place, a), k)
+                slope[i] = -compute_dot_forms(one.rate(place, a), k)
                 turned = one.turned(place, k) if row.carried else None
                 if turned is not None:
-                    slope[i] = slope[i] + dot_product(turned, b - a)
+                    slope[i] = slope[i] + compute_dot_forms(turned, b - a)
             for place, i in moving[1]:
-                slope[i] = dot_product(two.rate(place, b), k)
+                slope[i] = compute_dot_forms(two.rate(place, b), k)
         elif row.kind == "direction":
             u, v = rotate(one.R, row.one), rotate(two.R, row.other)
-            found.append(dot_product(u, v) - np.asarray(row.one @ row.other))  # type: ignore[operator]
+            found.append(compute_dot_forms(u, v) - np.asarray(row.one @ row.other))  # type: ignore[operator]
             for chain, swept, own, far in ((moving[0], one, u, v), (moving[1], two, v, u)):
                 for place, i in chain:
                     turned = swept.turned(place, own)
-                    slope[i] = dot_product(turned, far) if turned is not None else 0.0
+                    slope[i] = compute_dot_forms(turned, far) if turned is not None else 0.0
         else:
-            found.append(_distance(system, loop, values, one, a, slope))
+            found.append(_evaluate_distance(system, loop, values, one, a, slope))
         slopes.append(slope)
     return found, slopes
 
 
-def rod_ends(system: LoopSystem, loop: JointLoop, values: Any) -> tuple[Any, Any, Any]:
+def locate_rod_ends(system: LoopSystem, loop: JointLoop, values: Any) -> tuple[Any, Any, Any]:
     """Return the ends a and b of a loop with a joint that is left out, and the centre A of that joint (…, 3)."""
     assert loop.swung is not None
     one, two = (system.displacement(chain, values) for chain in loop.chains)
@@ -344,7 +344,9 @@ def rod_ends(system: LoopSystem, loop: JointLoop, values: Any) -> tuple[Any, Any
     return one.at(loop.point), two.at(loop.point), before.at(system.coordinates[loop.chains[1][loop.swung]].point)
 
 
-def _distance(system: LoopSystem, loop: JointLoop, values: Any, one: Swept, a: Any, slope: dict[int, Any]) -> Any:
+def _evaluate_distance(
+    system: LoopSystem, loop: JointLoop, values: Any, one: Swept, a: Any, slope: dict[int, Any]
+) -> Any:
     """(|a − A|² − |b − A|²) / 2 and its derivatives: A and b are seen without the joint that is left out."""
     assert loop.swung is not None
     before, after = loop.chains[1][: loop.swung], loop.chains[1][loop.swung + loop.swings :]
@@ -359,11 +361,11 @@ def _distance(system: LoopSystem, loop: JointLoop, values: Any, one: Swept, a: A
     ):
         for place, i in enumerate(chain):
             if values[i] is not None:
-                slope[i] = dot_product(swept.rate(place, p), v) * sign
-    return (dot_product(reach, reach) - dot_product(rod, rod)) * 0.5
+                slope[i] = compute_dot_forms(swept.rate(place, p), v) * sign
+    return (compute_dot_forms(reach, reach) - compute_dot_forms(rod, rod)) * 0.5
 
 
-def loop_system(mechanism: Mechanism, driven: Sequence[str], free: bool = False) -> LoopSystem:
+def build_loop_system(mechanism: Mechanism, driven: Sequence[str], free: bool = False) -> LoopSystem:
     """The loops of a mechanism, the coordinates of the joints ``driven`` given; ``free``: the pose of the platform is
     part of the coordinates, so that all its legs are loops.
 
@@ -371,24 +373,32 @@ def loop_system(mechanism: Mechanism, driven: Sequence[str], free: bool = False)
     """
     length = mechanism.length
     joints = list(mechanism.joints.values())
-    normal = plane_of(joints)
+    normal = find_motion_plane(joints)
     if free:
-        joints = [_free(mechanism, normal), *joints]
+        joints = [_make_free_joint(mechanism, normal), *joints]
     geared = {link for c in mechanism.couplings for link in (c.predecessor, c.successor)}
-    weights = [-2.0 if free and not k else _weight(joint, mechanism, driven, geared) for k, joint in enumerate(joints)]
-    tree = graphs.spanning_forest(mechanism.links, joints, weights)
+    weights = [
+        -2.0 if free and not k else _weigh_joint(joint, mechanism, driven, geared) for k, joint in enumerate(joints)
+    ]
+    tree = graphs.build_spanning_forest(mechanism.links, joints, weights)
     coordinates: list[TreeCoordinate] = []
     body = {mechanism.base: -1}
-    for joint, near, far in graphs.outward(mechanism.base, tree):
+    for joint, near, far in graphs.order_outward(mechanism.base, tree):
         own = joint if joint.predecessor == near else joint.turned()
         parent = body[near]
-        cut = parts(own)
+        cut = list_joint_parts(own)
         if own is not joint and joint.type is JointType.UNIVERSAL:
             cut = [(other[0], each[1], each[2]) for other, each in zip(reversed(cut), cut, strict=True)]
         for name, slides, axis in cut:
             coordinates.append(
                 TreeCoordinate(
-                    name, joint.name, slides, frozen(axis), frozen(own.point / length), parent, joint.name in driven
+                    name,
+                    joint.name,
+                    slides,
+                    freeze_array(axis),
+                    freeze_array(own.point / length),
+                    parent,
+                    joint.name in driven,
                 )
             )
             parent = len(coordinates) - 1
@@ -397,14 +407,18 @@ def loop_system(mechanism: Mechanism, driven: Sequence[str], free: bool = False)
     missing = [name for name in driven if name not in kept]
     if missing:
         raise BadMechanism(f"{mechanism.name}: motors form a kinematic loop by themselves", ", ".join(missing))
-    system = LoopSystem(mechanism, length, tuple(coordinates), body, (), _gears(mechanism, coordinates, length))
+    system = LoopSystem(
+        mechanism, length, tuple(coordinates), body, (), _list_couplings(mechanism, coordinates, length)
+    )
     loops = [
-        _loop(system, joint, normal) for joint in joints if joint.name not in kept and joint.type is not JointType.FREE
+        _build_loop(system, joint, normal)
+        for joint in joints
+        if joint.name not in kept and joint.type is not JointType.FREE
     ]
     return replace(system, loops=tuple(_shorten_loop(system, loops, loop) for loop in loops))
 
 
-def plane_of(joints: Sequence[Joint]) -> Array | None:
+def find_motion_plane(joints: Sequence[Joint]) -> Array | None:
     """The normal of the plane in which all of a robot's links move, as its joints are directed; None where there is
     none."""
     turning = [joint.axis for joint in joints if joint.type in (JointType.REVOLUTE, JointType.PLANAR)]
@@ -413,13 +427,13 @@ def plane_of(joints: Sequence[Joint]) -> Array | None:
         return None
     normal = turning[0]
     sliding = [joint.axis for joint in joints if joint.type is JointType.PRISMATIC]
-    planar = all(lines.parallel(normal, axis) for axis in turning) and all(
-        lines.perpendicular(normal, axis) for axis in sliding
+    planar = all(lines.is_parallel(normal, axis) for axis in turning) and all(
+        lines.is_perpendicular(normal, axis) for axis in sliding
     )
     return normal if planar else None
 
 
-def _free(mechanism: Mechanism, normal: Array | None) -> Joint:
+def _make_free_joint(mechanism: Mechanism, normal: Array | None) -> Joint:
     """A joint that lets the platform go where it likes, in its plane where there is one, about the middle of its own
     joints."""
     centre = np.mean([joint.point for joint in mechanism.joints_of(mechanism.platform)], axis=0)
@@ -430,7 +444,7 @@ def _free(mechanism: Mechanism, normal: Array | None) -> Joint:
     return Joint(name, kind, mechanism.base, mechanism.platform, centre, () if normal is None else (normal,))
 
 
-def _weight(joint: Joint, mechanism: Mechanism, driven: Sequence[str], geared: set[str]) -> float:
+def _weigh_joint(joint: Joint, mechanism: Mechanism, driven: Sequence[str], geared: set[str]) -> float:
     """Sort key of the spanning tree: motors and couplings first, then joints with few dof; joints of the platform
     last."""
     if joint.name in driven or (joint.successor in geared and joint.type.freedoms == 1):
@@ -438,16 +452,18 @@ def _weight(joint: Joint, mechanism: Mechanism, driven: Sequence[str], geared: s
     return _PREFERRED[joint.type.value] + (0.5 if mechanism.platform in joint.links else 0.0)
 
 
-def parts(joint: Joint) -> list[tuple[str, bool, Array]]:
+def list_joint_parts(joint: Joint) -> list[tuple[str, bool, Array]]:
     """The coordinates of a joint in their order: name, whether it slides, axis."""
-    found = elementary(joint.type, joint.axes)
+    found = split_elementary(joint.type, joint.axes)
     return [
         (f"{joint.name}.{k}" if len(found) > 1 else joint.name, kind is JointType.PRISMATIC, axis)
         for k, (kind, axis) in enumerate(found, 1)
     ]
 
 
-def _gears(mechanism: Mechanism, coordinates: Sequence[TreeCoordinate], length: float) -> tuple[CouplingEquation, ...]:
+def _list_couplings(
+    mechanism: Mechanism, coordinates: Sequence[TreeCoordinate], length: float
+) -> tuple[CouplingEquation, ...]:
     found = []
     for coupling in mechanism.couplings:
         pair = []
@@ -465,7 +481,7 @@ def _gears(mechanism: Mechanism, coordinates: Sequence[TreeCoordinate], length: 
     return tuple(found)
 
 
-def _loop(system: LoopSystem, joint: Joint, normal: Array | None) -> JointLoop:
+def _build_loop(system: LoopSystem, joint: Joint, normal: Array | None) -> JointLoop:
     """The loop that a cut joint closes, its equations as its type has them."""
     a, b = (system.way(system.body[link]) for link in joint.links)
     shared = sum(1 for i, k in zip(a, b, strict=False) if i == k)
@@ -474,8 +490,8 @@ def _loop(system: LoopSystem, joint: Joint, normal: Array | None) -> JointLoop:
         joint.name,
         joint.links,
         (a[shared:], b[shared:]),
-        frozen(point),
-        tuple(equations(joint)),
+        freeze_array(point),
+        tuple(list_joint_equations(joint)),
         planar=normal is not None,
     )
 
@@ -498,14 +514,17 @@ def _shorten_loop(system: LoopSystem, loops: Sequence[JointLoop], loop: JointLoo
             swings = sum(system.coordinates[k].joint == own.joint for k in chain)
             reach = loop.point - own.point
             rod = np.linalg.norm(cross(own.axis, reach) if loop.planar else reach)
-            if rod < SAME_POINT or sum(system.coordinates[k].joint == own.joint for k in chain[place:]) < swings:
+            if (
+                rod < POINT_DISTANCE_TOL
+                or sum(system.coordinates[k].joint == own.joint for k in chain[place:]) < swings
+            ):
                 continue
             ends, chains = (loop.ends, loop.chains) if side else (loop.ends[::-1], loop.chains[::-1])
             return replace(loop, ends=ends, chains=chains, swung=place, swings=swings)
     return loop
 
 
-def equations(joint: Joint) -> list[LoopRow]:
+def list_joint_equations(joint: Joint) -> list[LoopRow]:
     """Return the equations of a joint that is cut, (6 − its dof): positions first."""
     E = np.eye(3)
     if joint.type is JointType.SPHERICAL:
@@ -513,7 +532,7 @@ def equations(joint: Joint) -> list[LoopRow]:
     if joint.type is JointType.FIXED:
         return [LoopRow("point", e) for e in E] + [LoopRow("direction", E[k], E[(k + 1) % 3]) for k in range(3)]
     axis = joint.axis
-    across = plane_axes(axis)
+    across = build_plane_axes(axis)
     aligned = [LoopRow("direction", e, axis) for e in across]
     match joint.type:
         case JointType.REVOLUTE:

@@ -7,25 +7,25 @@ from typing import Annotated
 
 import numpy as np
 
-from ...budgets import BRANCH_CELLS, BRANCH_DEPTH, COARSEST_BRANCH_CELL, WIDEST_BRANCH_BOX
+from ...budgets import BRANCH_BOX_WIDTH_MAX, BRANCH_CELL_DEPTH_MAX, BRANCH_CELL_SIZE_FRACTION, BRANCH_CELLS_MAX
 from ...description.assembly.zero_configuration import at_file_zero
-from ...errors import BadMechanism, BadRequest, LoopsNotClosed
+from ...errors import BadMechanism, BadRequest, LoopClosureFailure
 from ...geometry.vectors import Array
 from ...mechanism import Mechanism
 from ...options import option
 from ...progress import report
-from ...tolerances import CLOSED
+from ...tolerances import CLOSURE_RESIDUAL_TOL
 from ..analysis_declaration import analysis
-from ..observed import RobotLike, as_robot
+from ..observed import RobotLike, read_robot
 from .answer import BranchCell, BranchPart, BranchProof
 from .cells import prove_all
-from .ends import toggles, turns
-from .growth import CellGrid, GrownCell, Growth, largest_box, lattice, whole_box
+from .ends import find_toggles, list_full_turns
+from .growth import CellGrid, GrownCell, Growth, find_largest_box, make_whole_cell, split_box
 from .injectivity import prove_injective_box
-from .limits import branch_limits
-from .loop_parts import LoopPart, parts_of, whole
-from .loops import LoopSystem, loop_system
-from .redundant import closed_to, unexplained_equations
+from .limits import list_branch_limits
+from .loop_parts import LoopPart, evaluate_all_equations, split_loop_system
+from .loops import LoopSystem, build_loop_system
+from .redundant import bound_closure_error, list_unexplained_equations
 
 GROUPS = "motion of the links in a subgroup of lower dimension"
 BOUNDED = "bounded over the tubes"
@@ -48,7 +48,7 @@ Cells = Annotated[int, option("Largest number of cells to try for each part of t
     examples=("rrrrr_m1 --box shoulder_1=-0.2:0.2,shoulder_2=-0.2:0.2",),
     seeded=False,
 )
-def branch(robot: RobotLike, box: MotorBox = None, *, max_cells: Cells = BRANCH_CELLS) -> BranchProof:
+def branch(robot: RobotLike, box: MotorBox = None, *, max_cells: Cells = BRANCH_CELLS_MAX) -> BranchProof:
     """Prove that the passive joints are a function of the motors on the branch of the zero configuration.
 
     Parameters
@@ -72,7 +72,7 @@ def branch(robot: RobotLike, box: MotorBox = None, *, max_cells: Cells = BRANCH_
         If the motors do not determine the platform at the zero configuration.
     BadRequest
         For unknown motors, or motors that depend on each other.
-    LoopsNotClosed
+    LoopClosureFailure
         If the file does not close its loops.
 
     Notes
@@ -86,22 +86,29 @@ def branch(robot: RobotLike, box: MotorBox = None, *, max_cells: Cells = BRANCH_
     """
     if max_cells < 1:
         raise BadRequest("--max-cells", max_cells, "1 or more")
-    given = as_robot(robot)
+    given = read_robot(robot)
     mechanism = given if isinstance(given, Mechanism) else given.robot
     mechanism.require_platform()
     mechanism.require_motors()
-    motors = [name for name, joint in mechanism.joints.items() if joint.actuated]
-    asked = parsed_box(box)
-    if not all(low <= _zero(mechanism, name) <= high for name, (low, high) in asked.items()):
+    motors = [name for name, joint in mechanism.joints.items() if joint.is_actuated]
+    asked = parse_box(box)
+    if not all(low <= _read_zero(mechanism, name) <= high for name, (low, high) in asked.items()):
         mechanism = at_file_zero(mechanism) or mechanism
     system, parts, held = _choose_shape(mechanism, motors, box)
-    intervals, source = _box(system, box)
+    intervals, source = _read_box(system, box)
     found, grown = [], []
     for part in parts:
-        grid, coarsest = _grid(part, intervals), COARSEST_BRANCH_CELL * _reach(part, intervals)
+        grid, coarsest = _build_grid(part, intervals), BRANCH_CELL_SIZE_FRACTION * _estimate_reach(part, intervals)
         q0, x0 = (system.zero[list(places)] for places in (part.driven, part.unknowns))
         growth = Growth(
-            part, grid, q0, x0, _depth(part), max_cells, coarsest, _first(grid, q0, coarsest, max_cells)
+            part,
+            grid,
+            q0,
+            x0,
+            _limit_depth(part),
+            max_cells,
+            coarsest,
+            _list_first_cells(grid, q0, coarsest, max_cells),
         ).run()
         grown.append(growth)
         found.append(_answer(part, growth))
@@ -121,7 +128,7 @@ def branch(robot: RobotLike, box: MotorBox = None, *, max_cells: Cells = BRANCH_
         regular,
         source,
         sum(growth.tried for growth in grown),
-        tuple(branch_limits(mechanism, motors, found, idle)),
+        tuple(list_branch_limits(mechanism, motors, found, idle)),
     )
 
 
@@ -131,56 +138,58 @@ Shaped = tuple[LoopSystem, tuple[LoopPart, ...], tuple[int, ...]]
 def _choose_shape(mechanism: Mechanism, motors: Sequence[str], box: BoxLike | None) -> Shaped:
     """The loops in the coordinates in which the larger cell about zero is proved: those of the joints alone, or with
     the pose of the platform, seen from which all legs are alike."""
-    system = loop_system(mechanism, motors).as_filed
-    errors, _ = whole(system, system.loops, system.gears, system.zero)
-    if len(errors) and np.linalg.norm(errors) > CLOSED:
-        raise LoopsNotClosed(mechanism.name, float(np.linalg.norm(errors)), CLOSED, system.loops[0].name)
-    joints: Shaped = (system, *parts_of(system))
+    system = build_loop_system(mechanism, motors).as_filed
+    errors, _ = evaluate_all_equations(system, system.loops, system.gears, system.zero)
+    if len(errors) and np.linalg.norm(errors) > CLOSURE_RESIDUAL_TOL:
+        raise LoopClosureFailure(
+            mechanism.name, float(np.linalg.norm(errors)), CLOSURE_RESIDUAL_TOL, system.loops[0].name
+        )
+    joints: Shaped = (system, *split_loop_system(system))
     if len(joints[1]) != 1 or mechanism.base == mechanism.platform:
         return joints
     try:
-        other = loop_system(mechanism, motors, free=True).as_filed
+        other = build_loop_system(mechanism, motors, free=True).as_filed
     except BadMechanism:  # a motor or a gear carries the platform itself
         return joints
-    posed: Shaped = (other, *parts_of(other))
+    posed: Shaped = (other, *split_loop_system(other))
     if len(posed[1]) != 1:
         return joints
-    return max((joints, posed), key=lambda each: _reach(each[1][0], _box(each[0], box)[0]))
+    return max((joints, posed), key=lambda each: _estimate_reach(each[1][0], _read_box(each[0], box)[0]))
 
 
-def _reach(part: LoopPart, intervals: Mapping[int, tuple[float, float]]) -> float:
+def _estimate_reach(part: LoopPart, intervals: Mapping[int, tuple[float, float]]) -> float:
     """The size of the largest cell about zero that is proved at once, as part of the box: by half as often as needed,
     or two thirds of that."""
-    grid = _grid(part, intervals)
-    sizes = np.array([scale * 2.0**-k for k in range(2 * BRANCH_DEPTH) for scale in (1.0, 0.7)])
+    grid = _build_grid(part, intervals)
+    sizes = np.array([scale * 2.0**-k for k in range(2 * BRANCH_CELL_DEPTH_MAX) for scale in (1.0, 0.7)])
     half = np.minimum(grid.high - grid.low, 2 * np.pi)[None] / 2 * sizes[:, None]
     q, x = (np.tile(part.system.zero[list(places)], (len(half), 1)) for places in (part.driven, part.unknowns))
     tubes = prove_all(part, q, half, x)
     return max((float(size) for size, tube in zip(sizes, tubes, strict=True) if tube is not None), default=0.0)
 
 
-def _first(grid: CellGrid, zero: Array, coarsest: float, max_cells: int) -> list[GrownCell]:
+def _list_first_cells(grid: CellGrid, zero: Array, coarsest: float, max_cells: int) -> list[GrownCell]:
     """Return the first cells: the box, or, if the cell limit is reached before fine enough cells fill it, as many as
     the limit allows of those that are proved about zero."""
     n = len(grid.low)
     if not coarsest or coarsest**n * max_cells >= 1:
-        return whole_box(n)
-    half = coarsest / COARSEST_BRANCH_CELL * np.minimum(grid.high - grid.low, 2 * np.pi) / 2
-    return lattice(grid, zero, half, max_cells)
+        return make_whole_cell(n)
+    half = coarsest / BRANCH_CELL_SIZE_FRACTION * np.minimum(grid.high - grid.low, 2 * np.pi) / 2
+    return split_box(grid, zero, half, max_cells)
 
 
-def _depth(part: LoopPart) -> int:
-    return BRANCH_DEPTH * (1 + len(part.driven))
+def _limit_depth(part: LoopPart) -> int:
+    return BRANCH_CELL_DEPTH_MAX * (1 + len(part.driven))
 
 
-def _grid(part: LoopPart, intervals: Mapping[int, tuple[float, float]]) -> CellGrid:
+def _build_grid(part: LoopPart, intervals: Mapping[int, tuple[float, float]]) -> CellGrid:
     own = [intervals[i] for i in part.driven]
     return CellGrid(np.array([low for low, _ in own]), np.array([high for _, high in own]))
 
 
-def _box(system: LoopSystem, box: BoxLike | None) -> tuple[dict[int, tuple[float, float]], str]:
+def _read_box(system: LoopSystem, box: BoxLike | None) -> tuple[dict[int, tuple[float, float]], str]:
     """The interval of each driven coordinate, in the system's units, and where they come from."""
-    given = parsed_box(box)
+    given = parse_box(box)
     limits = system.mechanism.filed
     found, sources = {}, set()
     for i in system.driven:
@@ -191,19 +200,19 @@ def _box(system: LoopSystem, box: BoxLike | None) -> tuple[dict[int, tuple[float
         if wanted is not None:
             low, high = wanted
             sources.add("as requested")
-        elif high - low <= WIDEST_BRANCH_BOX * unit:
+        elif high - low <= BRANCH_BOX_WIDTH_MAX * unit:
             sources.add("limits of the file")
         else:
             reach = system.length if each.slides else np.pi
             low, high = max(low, each.zero * unit - reach), min(high, each.zero * unit + reach)
             sources.add("plus and minus a characteristic length" if each.slides else "a full turn")
         zero = round(each.zero * unit, 12)
-        if not low <= zero <= high or not 0 < high - low <= WIDEST_BRANCH_BOX * unit:
+        if not low <= zero <= high or not 0 < high - low <= BRANCH_BOX_WIDTH_MAX * unit:
             raise BadRequest(
                 f"--box {each.name}={low:g}:{high:g}: interval of the motor",
                 f"{low:g}:{high:g}",
                 f"low < high, with {zero:.6g} (zero configuration) in it, at most "
-                f"{WIDEST_BRANCH_BOX * unit:.4g} {'m' if each.slides else 'rad'} wide",
+                f"{BRANCH_BOX_WIDTH_MAX * unit:.4g} {'m' if each.slides else 'rad'} wide",
             )
         found[i] = low / unit, high / unit
     if given:
@@ -211,13 +220,13 @@ def _box(system: LoopSystem, box: BoxLike | None) -> tuple[dict[int, tuple[float
     return found, ", ".join(sorted(sources))
 
 
-def _zero(mechanism: Mechanism, name: str) -> float:
+def _read_zero(mechanism: Mechanism, name: str) -> float:
     """The file's coordinate of a motor at the zero configuration."""
     joint = mechanism.joints.get(name)
     return 0.0 if joint is None or joint.offset is None or joint.offset.ndim > 1 else float(joint.offset[0])
 
 
-def parsed_box(box: BoxLike | None) -> dict[str, tuple[float, float]]:
+def parse_box(box: BoxLike | None) -> dict[str, tuple[float, float]]:
     """Return the requested intervals by motor."""
     if box is None:
         return {}
@@ -262,10 +271,10 @@ def _answer(part: LoopPart, growth: Growth) -> BranchPart:
     low, high = growth.grid.low, growth.grid.high
     box: tuple[Array, Array] = growth.q0, growth.q0
     if growth.proved:
-        corners = largest_box(growth)
+        corners = find_largest_box(growth)
         box = growth.grid.point(corners[0]), growth.grid.point(corners[1])
     names = system.names
-    loose = unexplained_equations(part)
+    loose = list_unexplained_equations(part)
     tubes = [leaf.tube for leaf in growth.proved if leaf.tube is not None]
     redundant = "" if not part.left_out else GROUPS if not loose else BOUNDED
     return BranchPart(
@@ -278,8 +287,8 @@ def _answer(part: LoopPart, growth: Growth) -> BranchPart:
         growth.share,
         float(np.prod((box[1] - box[0]) / (high - low))),
         tuple(cells),
-        toggles(growth),
-        turns(growth),
-        closed_to(part, tubes, loose),
+        find_toggles(growth),
+        list_full_turns(growth),
+        bound_closure_error(part, tubes, loose),
         redundant,
     )

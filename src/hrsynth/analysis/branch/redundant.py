@@ -6,21 +6,21 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...geometry.ranks import range_basis
+from ...geometry.ranks import compute_range_basis
 from ...geometry.vectors import Array
 from ...mechanism import JointType
-from .cells import BranchTube, evaluate_equations, trial_of
+from .cells import BranchTube, evaluate_equations, stack_tubes
 from .loop_parts import LoopEquation, LoopPart
-from .loops import JointLoop, LoopSystem, parts
+from .loops import JointLoop, LoopSystem, list_joint_parts
 
 
-def unexplained_equations(part: LoopPart) -> tuple[LoopEquation, ...]:
+def list_unexplained_equations(part: LoopPart) -> tuple[LoopEquation, ...]:
     """Redundant loop equations that do not follow from the others. All displacements about a loop lie in the group of
     dimension d that its joints generate. With f dof of the cut joint, d − f independent equations close it; the others
     hold as long as these are independent."""
     found = []
     chosen = [each.of.name for block in part.blocks for each in block.equations]
-    needed = {loop.name: dependent_rows(part.system, loop) for loop in part.loops if loop.swung is None}
+    needed = {loop.name: count_independent_equations(part.system, loop) for loop in part.loops if loop.swung is None}
     for each in part.left_out:
         name = each.of.name
         if name not in needed or chosen.count(name) != needed[name]:
@@ -28,7 +28,7 @@ def unexplained_equations(part: LoopPart) -> tuple[LoopEquation, ...]:
     return tuple(found)
 
 
-def dependent_rows(system: LoopSystem, loop: JointLoop) -> int:
+def count_independent_equations(system: LoopSystem, loop: JointLoop) -> int:
     """Return the number of independent equations of a loop."""
     return group_dimension(system, loop) - JointType(system.mechanism.joints[loop.name].type).freedoms
 
@@ -37,7 +37,7 @@ def group_dimension(system: LoopSystem, loop: JointLoop) -> int:
     """The dimension of the Lie algebra that the twists of a loop's joints at zero generate."""
     joint = system.mechanism.joints[loop.name]
     lines = [(each.slides, each.axis, each.point) for each in (system.coordinates[i] for i in loop.coordinates)]
-    lines += [(slides, axis, loop.point) for _, slides, axis in parts(joint)]
+    lines += [(slides, axis, loop.point) for _, slides, axis in list_joint_parts(joint)]
     basis = np.zeros((6, 0))
     twists = (
         np.array(
@@ -47,12 +47,12 @@ def group_dimension(system: LoopSystem, loop: JointLoop) -> int:
         .T
     )
     while True:
-        basis, rank = range_basis(np.hstack([basis, twists]), 1.0)
+        basis, rank = compute_range_basis(np.hstack([basis, twists]), 1.0)
         brackets = [_bracket(a, b) for a in basis.T for b in basis.T]
         if rank.value == 6 or not brackets:
             return rank.value
         twists = np.array(brackets).T
-        if range_basis(np.hstack([basis, twists]), 1.0)[1].value == rank.value:
+        if compute_range_basis(np.hstack([basis, twists]), 1.0)[1].value == rank.value:
             return rank.value
 
 
@@ -61,12 +61,12 @@ def _bracket(a: Array, b: Array) -> Array:
     return np.concatenate([np.cross(a[:3], b[:3]), np.cross(a[:3], b[3:]) + np.cross(a[3:], b[:3])])
 
 
-def closed_to(part: LoopPart, tubes: Sequence[BranchTube], equations: Sequence[LoopEquation]) -> float:
+def bound_closure_error(part: LoopPart, tubes: Sequence[BranchTube], equations: Sequence[LoopEquation]) -> float:
     """A bound, over tubes, of equations that were left out (characteristic lengths, pure numbers; of a distance how far
     it is off)."""
     if not equations or not tubes:
         return 0.0
-    trial = trial_of(part, tubes)
+    trial = stack_tubes(part, tubes)
     values, _ = evaluate_equations(part, equations, trial.forms(trial.radius))
     bound = 0.0
     for each, value in zip(equations, values, strict=True):

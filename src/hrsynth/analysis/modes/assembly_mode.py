@@ -7,26 +7,26 @@ from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
-from ...errors import LoopsNotClosed
-from ...geometry.vectors import Array, pose_difference
-from ...kinematics.assembly import NOT_FOUND, Assembler, Assembly, of_links
+from ...errors import LoopClosureFailure
+from ...geometry.vectors import Array, compare_poses
+from ...kinematics.assembly import NOT_FOUND, Assembler, Assembly, build_from_link_poses
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.joint_coordinates import OfConfiguration
 from ...kinematics.leg_solutions import ReachFailure
-from ...kinematics.limits import outside
+from ...kinematics.limits import list_joints_beyond
 from ...kinematics.tasks import FixedValuesTask
-from ...kinematics.velocity_relation import ObservationModel, relation
+from ...kinematics.velocity_relation import ObservationModel, compute_relation
 from ...mechanism.pose import Pose
 from ...records import FLAT, As, Number, Record, Recorded, Shown
-from ...tolerances import CLOSED, SAME_RELATION
+from ...tolerances import CLOSURE_RESIDUAL_TOL, RELATION_ANGLE_TOL
 from ..observed import ObservedRobot
-from ..singularity.condition_check import weakest
+from ..singularity.condition_check import compute_smallest_value
 from .branches import Model
 from .observation_loci import behind, opposite, sights
 from .solve import SystemMode
 
 
-class LegMissed(NamedTuple):
+class LegReachFailure(NamedTuple):
     """Leg of the real robot that does not reach a mode: the reason, and by how much it misses."""
 
     leg: str
@@ -113,7 +113,7 @@ class AssemblyMode(OfConfiguration, Record):
     radius_record = Shown(Number, lambda self: self.radius, As("radius"), "null if it is not known")
     radius_m = Shown(Number, lambda self: self.shift if np.isfinite(self.radius) else None)
     radius_rad = Shown(Number, lambda self: self.turn if np.isfinite(self.radius) else None)
-    closure_failures = Shown(list[LegMissed], lambda self: [LegMissed(*each) for each in self.misses])
+    closure_failures = Shown(list[LegReachFailure], lambda self: [LegReachFailure(*each) for each in self.misses])
 
 
 def found_mode(
@@ -125,7 +125,7 @@ def found_mode(
     goal: bool = False,
 ) -> AssemblyMode:
     """Return a closed configuration that was found as a mode of which nothing is proved."""
-    beyond, X = tuple(outside(at.model, at.q)), at.pose(setup.motion.link)
+    beyond, X = tuple(list_joints_beyond(at.model, at.q)), at.pose(setup.motion.link)
     found = Assembly(at, (), beyond)
     return AssemblyMode(
         setup.motion.pose(X),
@@ -134,7 +134,7 @@ def found_mode(
         residual,
         goal,
         found.reachable,
-        weakest(at, observation_model),
+        compute_smallest_value(at, observation_model),
         found.verdict,
         (),
         beyond,
@@ -160,14 +160,14 @@ class ModeReader:
     def away(self, mode: SystemMode) -> float:
         """Return the difference of a mode and the goal (characteristic lengths, differences of rotation matrices)."""
         return max(
-            pose_difference(X, self.goal.pose(body), self.goal.model.length)
+            compare_poses(X, self.goal.pose(body), self.goal.model.length)
             for body, X in self.made.bodies(mode.q).items()
         )
 
     def read(self, mode: SystemMode, nearest: bool) -> AssemblyMode:
         """Read a mode as one of the robot; of all modes the ``nearest`` to the goal can be it."""
         bodies, size = self.made.bodies(mode.q), self.goal.model.length
-        at_goal = nearest and self.away(mode) <= SAME_RELATION
+        at_goal = nearest and self.away(mode) <= RELATION_ANGLE_TOL
         near = mode.near
         held = () if near else self.measured
         scale = self.made.system.size / size
@@ -179,8 +179,8 @@ class ModeReader:
             found = Assembly(None, platform=self.assembler.platform(bodies))
         elif self.made.closing is not None:
             at = self.made.closing(mode.q)
-            found = Assembly(at, (), tuple(outside(at.model, at.q)), held=True)
-        elif not at_goal or near or outside(self.goal.model, self.goal.q):
+            found = Assembly(at, (), tuple(list_joints_beyond(at.model, at.q)), held=True)
+        elif not at_goal or near or list_joints_beyond(self.goal.model, self.goal.q):
             found = self.assembler.at(bodies, held, 0.0 if near else self.doubt(mode))
         if found.configuration is not None and self.made.closing is None and (gears := self.open(found.configuration)):
             found = Assembly(None, platform=self.assembler.platform(bodies), gears=gears)
@@ -219,7 +219,9 @@ class ModeReader:
 
     def distance(self, at: ClosedConfiguration | None) -> float | None:
         """Return the smallest singular value of Mᵀ, or None without Mᵀ."""
-        return None if at is None or relation(at, self.question).RI else weakest(at, self.question)
+        return (
+            None if at is None or compute_relation(at, self.question).RI else compute_smallest_value(at, self.question)
+        )
 
     def open(self, at: ClosedConfiguration) -> tuple[str, ...]:
         """Return the couplings that do not close where legs do."""
@@ -227,17 +229,17 @@ class ModeReader:
         if not model.mechanism.couplings:
             return ()
         try:
-            whole = of_links(model, at.pose)
-        except LoopsNotClosed:
+            whole = build_from_link_poses(model, at.pose)
+        except LoopClosureFailure:
             pass
         else:
             if all(
-                pose_difference(whole.pose(link), at.pose(link), at.model.length) <= SAME_RELATION
+                compare_poses(whole.pose(link), at.pose(link), at.model.length) <= RELATION_ANGLE_TOL
                 for link in at.model.mechanism.links
             ):
                 return ()
         left = model.gear_errors(model.read({link: at.pose(link) for link in model.mechanism.links}.__getitem__))
-        return tuple(name for name, miss in left.items() if abs(miss) > CLOSED) or tuple(left)
+        return tuple(name for name, miss in left.items() if abs(miss) > CLOSURE_RESIDUAL_TOL) or tuple(left)
 
     def doubt(self, mode: SystemMode) -> float:
         """Return how far the links' exact poses can be from the system's (characteristic lengths, radians); 0 if

@@ -33,13 +33,13 @@ from .constrained_platform import System
 from .loci import Circle, Line, Plane, Point, Sphere
 from .quadrics import UNIT, direction, normals
 from .rigid import Spatial
-from .roots import PRECISION
-from .translating import Articulated
+from .roots import ROOT_ISOLATION_BITS_COUNT
+from .translating import ArticulatedPlatform
 
-DEGREE = 40
+RIGID_BODY_VARIETY_DEGREE_COUNT = 40
 """The degree of X: of the poses of a rigid body among 16 coordinates."""
 
-FORMS = 7
+DOUBLE_POINT_DIRECTIONS_COUNT = 7
 """Directions in which X extends at one of its double points."""
 
 
@@ -87,10 +87,10 @@ def least_bound(system: System, legs: Sequence[int]) -> Bound | None:
         return None
     if isinstance(system, Spatial):
         return _of_a_body(system, legs)
-    return _of_two_bodies(system, legs) if isinstance(system, Articulated) else None
+    return _of_two_bodies(system, legs) if isinstance(system, ArticulatedPlatform) else None
 
 
-def _of_two_bodies(system: Articulated, legs: Sequence[int]) -> Bound | None:
+def _of_two_bodies(system: ArticulatedPlatform, legs: Sequence[int]) -> Bound | None:
     """Bézout for p in space and the slide's circle (degree 2): of a body's spheres all but one are planes by their
     differences, and those of the other body are linear in p then: 2 · 2 m, m the other body's conditions; without
     spheres 2 m. With a line for the slide one sphere of each body is left: 2 each."""
@@ -167,14 +167,14 @@ def degree_bound(system: Spatial, legs: Sequence[int]) -> Bound:
     from flint import ctx
 
     known = list[_Double]()
-    with ctx.workprec(PRECISION):
+    with ctx.workprec(ROOT_ISOLATION_BITS_COUNT):
         rows = list(_conditions(system, legs))
         for a, b in _covers(rows):
-            known += [each for each in _doubles(rows, a, b) if all(each.apart(other) for other in known)]
+            known += [each for each in _doubles(rows, a, b) if all(each.is_distinct_from(other) for other in known)]
     why = "six conditions on points of a rigid body (degree of the poses among 16 coordinates"
     if known:
         why += f", less 2 for each of {len(known)} isolated double points at infinity"
-    return Bound(DEGREE - 2 * len(known), f"{why})", "degree")
+    return Bound(RIGID_BODY_VARIETY_DEGREE_COUNT - 2 * len(known), f"{why})", "degree")
 
 
 def _conditions(system: Spatial, legs: Sequence[int]) -> Iterator[_Condition]:
@@ -217,7 +217,7 @@ class _Double:
     u: Any
     m: Any
 
-    def apart(self, other: _Double) -> bool:
+    def is_distinct_from(self, other: _Double) -> bool:
         """Return True if two of them are surely different."""
         tests = [
             *np.cross(self.v, other.v),
@@ -227,7 +227,7 @@ class _Double:
         ]
         return any(not each.contains(0) for each in tests)
 
-    def solves_alone(self, rows: Sequence[_Condition]) -> bool:
+    def is_isolated_solution(self, rows: Sequence[_Condition]) -> bool:
         """Return True if no other solution is near."""
         from flint import acb, acb_mat
 
@@ -252,7 +252,7 @@ class _Double:
             rest = acb_mat([row[:k] + row[k + 1 :] for row in table]).solve(acb_mat([[-row[k]] for row in table]))
         except ZeroDivisionError:
             return False
-        left = [rest[i, 0] for i in range(FORMS - 1)]
+        left = [rest[i, 0] for i in range(DOUBLE_POINT_DIRECTIONS_COUNT - 1)]
         h, nu, r = [*left[:k], acb(1), *left[k:]][-3:]
         return not (h * r - nu * nu).contains(0)
 
@@ -267,7 +267,7 @@ def _doubles(rows: Sequence[_Condition], a: _Pair, b: _Pair) -> Iterator[_Double
     for sign, other in product((1, -1), repeat=2):
         # v = e₁ + i e₂, n = e₁ × e₂, but u = f₁ − i f₂, m = f₁ × f₂: R is a turn from (f₁, f₂, m) to (e₁, e₂, n)
         found = _Double(o, _isotropic(first, sign * n, 1), sign * n, w, _isotropic(second, other * m, -1), other * m)
-        if found.solves_alone(rows):
+        if found.is_isolated_solution(rows):
             yield found
 
 

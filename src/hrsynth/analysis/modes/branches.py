@@ -10,18 +10,18 @@ from itertools import combinations, islice, product
 
 import numpy as np
 
-from ...budgets import BRANCH_CHOICES, EFFORT
+from ...budgets import LEG_SOLUTION_CHOICES_MAX, MODES_TIME_LIMIT_S
 from ...errors import TooLarge
-from ...geometry.vectors import Array, inverse, plane_axes, pose, pose_difference, transform
+from ...geometry.vectors import Array, build_plane_axes, build_pose, compare_poses, invert_pose, transform
 from ...kinematics.configuration import ClosedConfiguration
 from ...results import Value
-from ...tolerances import RANK_GAP, SAME_POINT
+from ...tolerances import POINT_DISTANCE_TOL, RANK_GAP_MIN
 from .constrained_platform import System
 from .loci import Circle, Line, Plane, Reach
 from .rigid import Planar, Spatial
 from .solve import SystemMode, SystemModes, solve
 from .tips import TipLoci
-from .translating import Articulated, Translating
+from .translating import ArticulatedPlatform, TranslatingPlatform
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,17 +55,17 @@ def _translating(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, .
     """q is the position of the first body's origin; tips are counted from there."""
     p = at[confined.bodies[0]][:3, 3]
     tips = np.array([_point(at[tip.body], tip.place) - p for tip in confined.tips])
-    return Model(Translating(curves, tips), partial(_shift_bodies, at, p), p)
+    return Model(TranslatingPlatform(curves, tips), partial(_shift_bodies, at, p), p)
 
 
 def _rigid(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -> Model:
     """q is relative to the goal: the frame of the plane of motion (in space: the base's) is at the first link's origin
     there."""
     p, n = at[confined.bodies[0]][:3, 3], confined.plane if confined.motion == "planar" else None
-    X_goal = pose(p)
+    X_goal = build_pose(p)
     if n is not None:
-        X_goal = pose(p, np.column_stack([*plane_axes(n), n]))
-    back = inverse(X_goal)
+        X_goal = build_pose(p, np.column_stack([*build_plane_axes(n), n]))
+    back = invert_pose(X_goal)
     tips = np.array([_point(back @ at[tip.body], tip.place) for tip in confined.tips]).reshape(-1, 3)
     if n is None:
         size = confined.goal.model.length
@@ -94,7 +94,7 @@ def _articulated_model(confined: TipLoci, at: dict[str, Array], curves: tuple[Re
     tips = np.array([_point(at[tip.body], tip.place) - at[tip.body][:3, 3] for tip in confined.tips])
     sides = tuple(confined.bodies.index(tip.body) for tip in confined.tips)
     return Model(
-        Articulated(curves, tips, sides, confined.slide),
+        ArticulatedPlatform(curves, tips, sides, confined.slide),
         partial(_on_circle, at[one], at[other], one, other, confined.slide),
         np.array([*p, 0.0]),
     )
@@ -112,7 +112,7 @@ def _carried_bodies(system: Spatial | Planar, at: dict[str, Array], q: Array) ->
 
 def _carried_back(system: Spatial | Planar, X_goal: Array, at: dict[str, Array], q: Array) -> dict[str, Array]:
     """Bodies from which the base is seen displaced as the system's frame is from where it is at the goal."""
-    D = X_goal @ inverse(system.pose(q))
+    D = X_goal @ invert_pose(system.pose(q))
     return {body: D @ X for body, X in at.items()}
 
 
@@ -130,7 +130,7 @@ def _point(X: Array, place: Array) -> Array:
 
 def _translate(X: Array, by: Array) -> Array:
     """A pose moved by a translation (3,)."""
-    return pose(X[:3, 3] + by, X[:3, :3])
+    return build_pose(X[:3, 3] + by, X[:3, :3])
 
 
 def choices(confined: TipLoci) -> Iterator[TipLoci]:
@@ -142,7 +142,9 @@ def choices(confined: TipLoci) -> Iterator[TipLoci]:
         yield replace(confined, tips=tips, error=confined.error * max(gain for _, gain in chosen))
 
 
-def solve_all(confined: TipLoci, *, near: bool = True, time_limit: float = EFFORT) -> tuple[Model, SystemModes]:
+def solve_all(
+    confined: TipLoci, *, near: bool = True, time_limit: float = MODES_TIME_LIMIT_S
+) -> tuple[Model, SystemModes]:
     """The goal's own system, and the modes of all choices of branches together, each pose once; of those as many as
     ``time_limit`` (s, by their size) allows. Raises ``TooLarge`` where it allows none."""
     first = model(next(choices(confined))).system
@@ -153,7 +155,7 @@ def solve_all(confined: TipLoci, *, near: bool = True, time_limit: float = EFFOR
             first.seconds,
             time_limit,
         )
-    most = int(min(BRANCH_CHOICES, time_limit / first.seconds))
+    most = int(min(LEG_SOLUTION_CHOICES_MAX, time_limit / first.seconds))
     made = [model(each) for each in islice(choices(confined), most)]
     size = made[0].system.size
     found = [
@@ -239,11 +241,11 @@ def _once(modes: Sequence[SystemMode], size: float) -> tuple[SystemMode, ...]:
     """Each pose once, the first of those that are one to rounding."""
     found: list[SystemMode] = []
     for mode in modes:
-        if all(_apart(mode, other, size) > SAME_POINT / RANK_GAP for other in found):
+        if all(_apart(mode, other, size) > POINT_DISTANCE_TOL / RANK_GAP_MIN for other in found):
             found.append(mode)
     return tuple(found)
 
 
 def _apart(one: SystemMode, other: SystemMode, size: float) -> float:
     """Return the difference of two poses (sizes, entries of the rotations)."""
-    return pose_difference(one.pose, other.pose, size)
+    return compare_poses(one.pose, other.pose, size)

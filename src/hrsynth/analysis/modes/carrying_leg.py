@@ -10,14 +10,21 @@ import numpy as np
 
 from ...errors import UnsupportedLocus
 from ...geometry import lines
-from ...geometry.vectors import Array, perpendicular, plane_axes, unit
+from ...geometry.vectors import Array, build_plane_axes, find_perpendicular, normalise_vector
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.locked_twists import carry_joint
 from ...kinematics.velocity_relation import ObservationModel
 from ...mechanism import Direction, Joint, JointType
 from ...mechanism.legs import Leg
 from ...mechanism.observations.encoder import Encoder
-from ...tolerances import CHAIN_ROUNDING, MOVED, RANK_GAP, SAME_DIRECTION, SAME_POINT, SAME_RELATION
+from ...tolerances import (
+    CHAIN_ROUNDING,
+    DIRECTION_SINE_TOL,
+    MOVED_AXIS_LEVER_MAX,
+    POINT_DISTANCE_TOL,
+    RANK_GAP_MIN,
+    RELATION_ANGLE_TOL,
+)
 from ..measured import MeasuredRobot
 from .carrying_leg_system import CarriedCondition, CarriedPlatform, Turn
 from .conditions import AtAngle, PoseCondition
@@ -50,12 +57,12 @@ def carried_platform(measured: MeasuredRobot, goal: ClosedConfiguration, error: 
         rows, turns, alike, off = _exactly(freedoms, [c for c, _ in told])
         asked = [CarriedCondition.of(c, turns[:joints]) for c, (_, joints) in zip(alike, told, strict=True)]
         moved += middle.size * (off + max((each.moved for each in asked), default=0.0))
-        error_ = error + MOVED * moved + max([0.0, *(sight.error(error, goal) for sight in seen)])
+        error_ = error + MOVED_AXIS_LEVER_MAX * moved + max([0.0, *(sight.error(error, goal) for sight in seen)])
         each = CarriedPlatform(
             (), np.zeros((0, 3)), turns, tuple(asked), middle, goal.pose(body), seen=seen, error=error_, rows=rows
         )
         off_ = each.values(each.home, asked)[0] if asked and turns else np.zeros(0)
-        if turns and np.abs(off_).max(initial=0.0) <= SAME_RELATION and each.square:
+        if turns and np.abs(off_).max(initial=0.0) <= RELATION_ANGLE_TOL and each.square:
             found.append(each)
         else:
             reason = "the conditions of its legs do not determine isolated poses"
@@ -78,21 +85,21 @@ def _exactly(
         moved = max(moved, off if off > CHAIN_ROUNDING else 0.0)
         return found
 
-    def direction(v: Array, known: Sequence[Array] = (), within: float = SAME_POINT / RANK_GAP) -> Array:
+    def direction(v: Array, known: Sequence[Array] = (), within: float = POINT_DISTANCE_TOL / RANK_GAP_MIN) -> Array:
         flat = np.where(np.abs(v) <= within, 0.0, v)
         flat = np.sign(flat) if np.count_nonzero(flat) == 1 and abs(abs(flat.sum()) - 1.0) <= within else flat
         return near(near(v, [flat], within), [s * other for other in known for s in (1.0, -1.0)], within)
 
     for each in freedoms:
-        a, o = direction(rows @ each.axis, [other.axis for other in turns], SAME_DIRECTION), rows @ each.point
+        a, o = direction(rows @ each.axis, [other.axis for other in turns], DIRECTION_SINE_TOL), rows @ each.point
         for k, other in enumerate(turns if not each.slides else ()):
             far = float(np.linalg.norm(np.cross(other.point - o, a)))
             at = (
                 None
                 if other.slides
                 else other.point
-                if far <= SAME_POINT / RANK_GAP
-                else lines.meeting_point([(o, a), (other.point, other.axis)], SAME_POINT / RANK_GAP)
+                if far <= POINT_DISTANCE_TOL / RANK_GAP_MIN
+                else lines.find_meeting_point([(o, a), (other.point, other.axis)], POINT_DISTANCE_TOL / RANK_GAP_MIN)
             )
             if at is not None:
                 off = max(float(np.linalg.norm(np.cross(p - at, b))) for p, b in ((o, a), (other.point, other.axis)))
@@ -104,7 +111,7 @@ def _exactly(
     for c in conditions:
         told: dict[str, Any] = {}
         for name in (each for each in "bo" if hasattr(c, each)):
-            told[name] = near(rows @ getattr(c, name), points, SAME_POINT / RANK_GAP)
+            told[name] = near(rows @ getattr(c, name), points, POINT_DISTANCE_TOL / RANK_GAP_MIN)
             points.append(told[name])
         for name in (each for each in "candmt" if hasattr(c, each)):
             told[name] = direction(rows @ getattr(c, name), arrows)
@@ -117,8 +124,10 @@ def _rows(axes: Sequence[Array]) -> Array:
     if not axes:
         return np.eye(3)
     z = axes[0]
-    other = next((each for each in axes if np.linalg.norm(np.cross(z, each)) > SAME_DIRECTION), perpendicular(z))
-    y = unit(np.cross(z, other))
+    other = next(
+        (each for each in axes if np.linalg.norm(np.cross(z, each)) > DIRECTION_SINE_TOL), find_perpendicular(z)
+    )
+    y = normalise_vector(np.cross(z, other))
     return np.stack([np.cross(y, z), y, z])
 
 
@@ -134,7 +143,7 @@ def freedoms_of(
     found = list[Turn]()
     for axis in () if joint.name in held else axes if joint.predecessor == at else axes[::-1]:
         a, o = axis / np.linalg.norm(axis), middle.point(point)
-        found += [Turn(a, o, False)] * (turns[joint.type] > 0) + [Turn(a, o, True)] * joint.type.slides
+        found += [Turn(a, o, False)] * (turns[joint.type] > 0) + [Turn(a, o, True)] * joint.type.has_translation
     return found
 
 
@@ -146,7 +155,7 @@ def _carrier(
     decomposition, mechanism = measured.setup.decomposition, measured.setup.decomposition.mechanism
     own = [each for each in rest.observations if each.leg == leg.label]
     held = [each.joint for each in own if isinstance(each, Encoder)]
-    if decomposition.floats(leg):
+    if decomposition.is_free_body(leg):
         raise UnsupportedLocus(mechanism.name, "nothing carries its platform: it is a free body")
     path, at, found, links = decomposition.path(leg), mechanism.base, list[Turn](), {mechanism.base: 0}
     if set(leg.joints) - {name for edge in path for name in edge.joints}:
@@ -172,7 +181,7 @@ def _carrier(
         d = goal.pose(each.link)[:3, :3] @ each.direction
         told += [
             (AtAngle(leg.label, none, d, e, h), links[each.link])
-            for e, h in zip((*plane_axes(d), d), (0.0, 0.0, 1.0), strict=True)
+            for e, h in zip((*build_plane_axes(d), d), (0.0, 0.0, 1.0), strict=True)
             if links[each.link]
         ]
     return tuple(found), told

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from ...budgets import LARGEST_LOOPS, PLANAR_STARTS
-from ...constraints.pattern import leg_ends
-from ...errors import SystemNotSolved, UnsupportedLocus
-from ...geometry.vectors import Array, cross, frozen, hat
+from ...constraints.pattern import list_leg_ends
+from ...errors import ExternalSolverFailure, UnsupportedLocus
+from ...geometry.vectors import Array, cross, freeze_array, hat
 from ...kinematics.configuration import ClosedConfiguration
 from ..measured import MeasuredRobot
 from .branches import Model
@@ -20,11 +20,20 @@ from .carrying_leg_system import CarriedCondition, CarriedEquation, CarriedPlatf
 from .conditions import PoseCondition
 from .joint_forms import closings_bound, eigenvalues
 from .polynomials import Polynomial, krawczyk
-from .pose_boxes import FAR_FROM_REAL, PRECISION, PoseBox, UnitLength, as_box, at_middle, told_far, zeros
+from .pose_boxes import (
+    COMPLEX_ZERO_IMAGINARY_MIN,
+    POSE_BOX_BITS_COUNT,
+    PoseBox,
+    UnitLength,
+    as_box,
+    at_middle,
+    told_far,
+    zeros,
+)
 from .pose_forms import Poses
 from .solve import SystemMode, SystemModes
 
-FEW_JOINTS = 2
+RANDOM_START_JOINTS_MAX = 2
 """Joints up to which random starts find all zeros soon."""
 
 
@@ -63,7 +72,7 @@ class _Half(CarriedEquation):
 
 
 @dataclass(frozen=True)
-class _Fixed:
+class _FixedUnknown:
     """An unknown, by its number, that has a value."""
 
     k: int
@@ -112,14 +121,14 @@ def polish_zeros(system: CarriedPlatform, q: Array, known: Iterable[Array] = ())
 
 
 def solve_carried(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0) -> tuple[Model, SystemModes]:
-    """List all modes, with the goal known to ``error`` (m). Raises ``UnsupportedLocus``, and ``SystemNotSolved`` if not
-    all zeros that there may be are enclosed."""
+    """List all modes, with the goal known to ``error`` (m). Raises ``UnsupportedLocus``, and ``ExternalSolverFailure``
+    if not all zeros that there may be are enclosed."""
     if not np.isfinite(error):
         raise UnsupportedLocus(
             measured.setup.robot.name, "the distance to the exact closed configuration is not bounded"
         )
     system = carried_platform(measured, goal, error)
-    (body,) = leg_ends(measured.setup.decomposition)
+    (body,) = list_leg_ends(measured.setup.decomposition)
     return Model(system, lambda q: {body: system.pose(q)}, system.home), _judge(system)
 
 
@@ -128,7 +137,11 @@ def enclose_zeros(system: CarriedPlatform, proposed: Array) -> list[PoseBox]:
     n = len(system.freedoms_)
     equations: list[Polynomial] = [system.equation(each) for each in system.square]
     for k, each in enumerate(system.freedoms_):
-        equations += [_Fixed(k, 1), _Fixed(n + k, 0)] if each.slides else [UnitLength((k, n + k)), _Fixed(2 * n + k, 0)]
+        equations += (
+            [_FixedUnknown(k, 1), _FixedUnknown(n + k, 0)]
+            if each.slides
+            else [UnitLength((k, n + k)), _FixedUnknown(2 * n + k, 0)]
+        )
     return zeros(equations, map(system.unknowns, proposed))[0]
 
 
@@ -140,9 +153,11 @@ def _far(system: CarriedPlatform, proposed: Array, known: Sequence[PoseBox]) -> 
         _Half(each.condition, Poses.spatial(), None, system.freedoms_, each.joints, each.idle) for each in system.square
     ]
     slides, found = np.array([each.slides for each in system.freedoms_]), list[PoseBox]()
-    with ctx.workprec(PRECISION):
+    with ctx.workprec(POSE_BOX_BITS_COUNT):
         for q in proposed:
-            if np.abs(q.imag[~slides]).max(initial=0.0) < FAR_FROM_REAL or at_middle(known, system.unknowns(q)):
+            if np.abs(q.imag[~slides]).max(initial=0.0) < COMPLEX_ZERO_IMAGINARY_MIN or at_middle(
+                known, system.unknowns(q)
+            ):
                 continue
             with np.errstate(all="ignore"):
                 start = np.where(slides, q, np.tan(q / 2.0))
@@ -159,7 +174,7 @@ def _far(system: CarriedPlatform, proposed: Array, known: Sequence[PoseBox]) -> 
                 False,
                 0,
             )
-            if box is not None and box.apart((*known, *found)):
+            if box is not None and box.is_disjoint_from((*known, *found)):
                 found.append(replace(box, rounded=True))
     return found
 
@@ -171,27 +186,27 @@ def _judge(system: CarriedPlatform) -> SystemModes:
     n, most = len(system.freedoms_), system.most(system.square)
     size = f"{n} joint{'s' * (n > 1)} of the leg that carries the platform"
     if most > LARGEST_LOOPS:
-        raise SystemNotSolved("the leg", f"{size}: up to {most} solutions, too many (at most {LARGEST_LOOPS})")
+        raise ExternalSolverFailure("the leg", f"{size}: up to {most} solutions, too many (at most {LARGEST_LOOPS})")
     why, bound = "degrees in each (Bézout)", "class"
-    boxes = enclose_zeros(system, proposals(system, most)) if n <= FEW_JOINTS else []
+    boxes = enclose_zeros(system, proposals(system, most)) if n <= RANDOM_START_JOINTS_MAX else []
     if len(boxes) < most and (counted := closings_bound(system, system.square)) is not None:
         most, why, bound = counted.most, "ranks modulo a prime of 62 bits", "rank"
         proposed = polish_zeros(system, eigenvalues(system, system.square, counted))
         boxes = enclose_zeros(system, proposed)
         boxes += _far(system, proposed, boxes)
-    at_goal = [box for box in boxes if box.real and box.holds(system.unknowns(system.home))]
+    at_goal = [box for box in boxes if box.real and box.has_pose(system.unknowns(system.home))]
     if len(boxes) != most or len(at_goal) != 1:
-        raise SystemNotSolved("the leg", f"{size}: of {most} solutions at most ({why}) {len(boxes)} have boxes")
+        raise ExternalSolverFailure("the leg", f"{size}: of {most} solutions at most ({why}) {len(boxes)} have boxes")
     bodies = [_body(system, box) for box in boxes]
     if any(
         all((a - b).contains(0) for a, b in zip(one, other, strict=True))
         for k, one in enumerate(bodies)
         for other in bodies[:k]
     ):
-        raise SystemNotSolved("the leg", f"{size}: several of {most} solutions have one pose of the platform")
+        raise ExternalSolverFailure("the leg", f"{size}: several of {most} solutions have one pose of the platform")
     besides = [system.equation(each) for each in system.told if each not in system.square]
     real = [box for box in boxes if box.real]
-    with ctx.workprec(PRECISION):
+    with ctx.workprec(POSE_BOX_BITS_COUNT):
         kept = [
             box for box in real if box is at_goal[0] or not any(not each.value(box.box).contains(0) for each in besides)
         ]
@@ -211,7 +226,7 @@ def _body(system: CarriedPlatform, box: PoseBox) -> list[Any]:
     from flint import ctx
 
     found = list[Any]()
-    with ctx.workprec(PRECISION):
+    with ctx.workprec(POSE_BOX_BITS_COUNT):
         for c in np.vstack([np.zeros(3), np.eye(3)]):
             told = CarriedCondition(PoseCondition("", np.zeros(3), c), system.carrying)
             at, arrow, _ = system.equation(told).point_and_arrow(box.box)
@@ -237,8 +252,8 @@ def as_mode(system: CarriedPlatform, box: PoseBox, proved: bool, miss: float | N
         shift,
         turn,
         miss,
-        frozen(system.pose(q)),
-        frozen(q),
+        freeze_array(system.pose(q)),
+        freeze_array(q),
         proved=proved,
         match_residual=not proved,
     )

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from ...geometry.vectors import Array, cross, hat, pose
-from ...tolerances import CHAIN_ROUNDING, INDEPENDENT_RATES, SAME_DIRECTION
+from ...geometry.vectors import Array, build_pose, cross, hat
+from ...tolerances import CHAIN_ROUNDING, DIRECTION_SINE_TOL, INDEPENDENT_RATES_MIN
 from .conditions import AtAngle, OnMovingPlane, OnMovingRevolution, OnPlane, OnRevolution, PoseCondition
 from .constrained_platform import System
 from .leg_conditions import OriginAndUnit
@@ -60,7 +60,7 @@ class CarriedCondition:
         for order, misses in ((range(len(freedoms)), _before), (range(len(freedoms))[::-1], _after)):
             for k in order:
                 miss = misses(condition, freedoms[k])
-                if miss > SAME_DIRECTION:
+                if miss > DIRECTION_SINE_TOL:
                     break
                 idle.add(k)
                 off += miss if miss > CHAIN_ROUNDING else 0.0
@@ -88,7 +88,7 @@ def _before(c: PoseCondition, freedom: Turn) -> float:
     if isinstance(c, AtAngle):
         return 0.0 if freedom.slides else float(np.linalg.norm(np.cross(c.a, a)))
     if isinstance(c, OnRevolution) and not freedom.slides:
-        tilt = 0.0 if _sphere(c) else float(np.linalg.norm(np.cross(c.a, a)))
+        tilt = 0.0 if _is_sphere_condition(c) else float(np.linalg.norm(np.cross(c.a, a)))
         return max(tilt, float(np.linalg.norm(np.cross(c.o - freedom.point, a))))
     return np.inf
 
@@ -101,7 +101,7 @@ def _after(c: PoseCondition, freedom: Turn) -> float:
     return turned if isinstance(c, AtAngle) else max(turned, float(np.linalg.norm(np.cross(c.b - freedom.point, a))))
 
 
-def _sphere(c: PoseCondition) -> bool:
+def _is_sphere_condition(c: PoseCondition) -> bool:
     """Return True if it is a distance, not a height."""
     return isinstance(c, OnRevolution) and float(c.f[2]) == -1.0 and float(c.f[1]) == 0.0
 
@@ -198,7 +198,7 @@ class CarriedPlatform(System):
         """The platform's pose (4, 4), m."""
         R, p = self.transform(q, self.carrying)
         R, p, o = self.rows.T @ R @ self.rows, self.rows.T @ p, self.middle.origin
-        return np.asarray(pose(o + self.size * p - R @ o, R) @ self.start)
+        return np.asarray(build_pose(o + self.size * p - R @ o, R) @ self.start)
 
     def values(self, q: Array, chosen: Sequence[CarriedCondition]) -> tuple[Array, Array]:
         """The values (..., m) of conditions and their derivatives (..., m, n) by q."""
@@ -227,7 +227,7 @@ class CarriedPlatform(System):
         """Return a bound of the isolated common zeros of as many conditions as joints."""
         n = len(self.freedoms_)
         degrees = np.array([[each.degree(k, f) for k, f in enumerate(self.freedoms_)] for each in chosen])
-        alike = [i for i, each in enumerate(chosen) if _sphere(each.condition)]
+        alike = [i for i, each in enumerate(chosen) if _is_sphere_condition(each.condition)]
         slides = [k for k, each in enumerate(self.freedoms_) if each.slides]
         tables = [degrees]
         for one in alike if slides else ():  # the squares of slides are the same in all: differences have none
@@ -239,12 +239,12 @@ class CarriedPlatform(System):
         found = [permanent(table) for table in tables]
         for (i, j), table in product(combinations(range(n), 2), tables):
             rest = [k for k in range(n) if k not in (i, j)]
-            if self._meets(chosen[i], chosen[j]) and not table[rest, 0].any():
+            if self._has_common_point(chosen[i], chosen[j]) and not table[rest, 0].any():
                 bent = np.where(degrees[[i, j], 1:].any(axis=0), 4, 0)
                 found.append(permanent(np.vstack([bent, table[rest, 1:]])))
         return min(found)
 
-    def _meets(self, one: CarriedCondition, other: CarriedCondition) -> bool:
+    def _has_common_point(self, one: CarriedCondition, other: CarriedCondition) -> bool:
         """Return True if two conditions fix one point, and give the rotation of the first joint about its axis: N R η =
         A with |R η| = |η|, so |N⁻¹ A|² = |η|², of degree two in the other joints' c and s, and one turn for each
         zero."""
@@ -254,9 +254,9 @@ class CarriedPlatform(System):
         rows = [
             c.n if isinstance(c, OnPlane) else c.o - o
             for c in (one.condition, other.condition)
-            if isinstance(c, OnPlane) or (isinstance(c, OnRevolution) and _sphere(c))
+            if isinstance(c, OnPlane) or (isinstance(c, OnRevolution) and _is_sphere_condition(c))
         ]
-        return len(rows) == 2 and abs(float(a @ np.cross(rows[0], rows[1]))) > SAME_DIRECTION
+        return len(rows) == 2 and abs(float(a @ np.cross(rows[0], rows[1]))) > DIRECTION_SINE_TOL
 
     @cached_property
     def square(self) -> tuple[CarriedCondition, ...]:
@@ -266,8 +266,8 @@ class CarriedPlatform(System):
             most = self.most(chosen)
             if most and (best is None or most < best[0]):
                 rows = self.values(self.home, chosen)[1]
-                rows = rows / np.maximum(np.linalg.norm(rows, axis=1), INDEPENDENT_RATES)[:, None]
-                if np.linalg.svd(rows, compute_uv=False)[-1] > INDEPENDENT_RATES:
+                rows = rows / np.maximum(np.linalg.norm(rows, axis=1), INDEPENDENT_RATES_MIN)[:, None]
+                if np.linalg.svd(rows, compute_uv=False)[-1] > INDEPENDENT_RATES_MIN:
                     best = most, chosen
         return () if best is None else best[1]
 

@@ -17,11 +17,11 @@ import numpy as np
 
 from ...budgets import ELIMINATION_SECONDS, HOMOTOPY_SECONDS, MSOLVE_SECONDS
 from ...errors import BadRequest
-from ...geometry.vectors import Array, frozen, pose
+from ...geometry.vectors import Array, build_pose, freeze_array
 from ...results import Value
-from ...tolerances import FARTHEST, TIP_ROUNDING
+from ...tolerances import SOLUTION_DISTANCE_MAX, TIP_ROUNDING
 from .loci import Point, Reach, curves_of, extent, length, shift_reach
-from .quadrics import SLACK, UNIT, Balls, PoseParametrization, Within, WorkingFrame, spatial_frame
+from .quadrics import UNIT, WORKING_FRAME_ROUNDING_TOL, Balls, PoseParametrization, Within, WorkingFrame, spatial_frame
 from .square_systems import SquareSystem
 
 
@@ -44,7 +44,7 @@ class System(Value):
     """True if all tips are those of one body that rotates, and the points solved for theirs."""
 
     def __post_init__(self) -> None:
-        tips = frozen(self.tips)
+        tips = freeze_array(self.tips)
         if tips.shape != (len(self.curves), self.space) or not np.all(np.isfinite(tips)):
             raise BadRequest(
                 "shape of a platform's tips", list(tips.shape), f"{len(self.curves)} by {self.space} finite numbers"
@@ -64,7 +64,7 @@ class System(Value):
     @property
     def seconds(self) -> float:
         """Estimated time of its list on one core (s)."""
-        if not self.surfaces:
+        if not self.has_surface_loci:
             return ELIMINATION_SECONDS
         return HOMOTOPY_SECONDS if self.rigid else MSOLVE_SECONDS
 
@@ -78,20 +78,20 @@ class System(Value):
         return max(0, self.freedoms - sum(self.forbids[k] for k in legs))
 
     @property
-    def surfaces(self) -> bool:
+    def has_surface_loci(self) -> bool:
         """True if a tip is confined to a surface only."""
         return len(curves_of(self.curves)) < len(self.curves)
 
     @property
     def farthest(self) -> float:
         """Beyond which a solution is at infinity but for rounding (sizes)."""
-        return math.inf if self.as_written else FARTHEST
+        return math.inf if self.as_written else SOLUTION_DISTANCE_MAX
 
     def balls(self, frame: WorkingFrame | None) -> Within:
         """Balls that hold the exact input in a working frame; the finest where it is not known how far it is."""
         if frame is None or not np.isfinite(self.error):
             return Balls
-        return Within(SLACK + UNIT * self.error / min(frame.size, self.size))
+        return Within(WORKING_FRAME_ROUNDING_TOL + UNIT * self.error / min(frame.size, self.size))
 
     @cached_property
     def frame(self) -> WorkingFrame:
@@ -188,7 +188,7 @@ def _spread(points: tuple[tuple[float, ...], ...], arrows: tuple[tuple[float, ..
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Shifting(System):
+class TranslatingBodies(System):
     """A platform whose bodies only translate; q starts with the position p of the first."""
 
     rigid = False
@@ -200,4 +200,4 @@ class Shifting(System):
 
     def pose(self, q: Array) -> Array:
         """The first body's frame in the base frame; shape (4, 4)."""
-        return pose(q[:3])
+        return build_pose(q[:3])

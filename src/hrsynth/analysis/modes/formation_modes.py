@@ -12,19 +12,28 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...budgets import SEARCH_ITERATIONS, SEARCH_QUIET, SEARCH_STARTS
+from ...budgets import MODE_SEARCH_ITERATIONS_MAX, MODE_SEARCH_QUIET_STARTS_COUNT, MODE_SEARCH_STARTS_MAX
 from ...errors import UndefinedValue
-from ...geometry.ranks import kernel_basis
-from ...geometry.vectors import Array, pose
+from ...geometry.ranks import compute_kernel_basis
+from ...geometry.vectors import Array, build_pose
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.tasks import FixedValuesTask, solve
-from ...kinematics.velocity_relation import ObservationModel, relation
+from ...kinematics.velocity_relation import ObservationModel, compute_relation
 from ...mechanism import JointType
 from ...mechanism.cameras import CameraObservation
 from ...mechanism.observations.direction import SeenAxis
 from ...progress import report
-from ...tolerances import CHAIN_ROUNDING, CLOSED, MOVED, NAMED, NUMBER_ROUNDING, SAME_RELATION, SOLVED, VANISHES
-from ..formation import Formation, Similarities, formation_at, seen_at
+from ...tolerances import (
+    CHAIN_ROUNDING,
+    CLOSURE_RESIDUAL_TOL,
+    CLOSURE_SOLVER_TOL,
+    LOCUS_DISTANCE_TOL,
+    MOVED_AXIS_LEVER_MAX,
+    NAMED_TWIST_TOL,
+    NUMBER_ROUNDING,
+    RELATION_ANGLE_TOL,
+)
+from ..formation import Formation, Similarities, analyze_formation, list_sensed_points
 from ..observed import ObservedRobot
 from .goal_error import drift
 from .observation_loci import opposite
@@ -60,13 +69,13 @@ class FormedModes:
 def formation_modes(setup: ObservedRobot) -> FormedModes:
     """The modes of a formation with the measurements of its zero configuration."""
     at, observation_model = setup.all_samples.start, setup.samples.observation_model
-    formation = formation_at(at, observation_model, relation(at, observation_model), setup.decomposition)
+    formation = analyze_formation(at, observation_model, compute_relation(at, observation_model), setup.decomposition)
     goal = FormedMode(at, {body: at.pose(body) for body in formation.bodies}, at.residual)
-    sliding = _Sliding(setup) if _slides(at) else None
+    sliding = _SliderFormation(setup) if _has_only_sliders(at) else None
     if formation.count:
         flexes = "; ".join(flex.name for flex in formation.flexes)
         generic = setup.samples.members[0]
-        usual = formation_at(generic.configuration, observation_model, generic.relation, setup.decomposition).count
+        usual = analyze_formation(generic.configuration, observation_model, generic.relation, setup.decomposition).count
         if formation.count == usual or (sliding is not None and not sliding.spheres):
             words = f"no measured value shows {flexes}: a continuous family of dimension {formation.count}"
             return FormedModes(formation, (), words, degenerate=words, continuum=formation.count)
@@ -84,7 +93,7 @@ def formation_modes(setup: ObservedRobot) -> FormedModes:
     return listed or _search(observation_model, formation, formation.group, goal)
 
 
-def _slides(at: ClosedConfiguration) -> bool:
+def _has_only_sliders(at: ClosedConfiguration) -> bool:
     """Return True if all joints are prismatic and in no loop: no link rotates, and points are linear in the
     coordinates."""
     mechanism = at.model.mechanism
@@ -95,7 +104,7 @@ def _slides(at: ClosedConfiguration) -> bool:
     )
 
 
-class _Sliding:
+class _SliderFormation:
     """A formation whose bodies only slide, about its goal: the measured values are planes, linear in the slides, and
     ``spheres``, vectors (3,) of constant length with their slopes (3, slides), metres."""
 
@@ -103,7 +112,7 @@ class _Sliding:
         self.at, self.question = setup.all_samples.start, setup.samples.observation_model
         model = self.at.model
         steps = [ClosedConfiguration.of(model, model.integrate(self.at.q, each)) for each in np.eye(model.nv)]
-        seen, points = seen_at(self.at, self.question)
+        seen, points = list_sensed_points(self.at, self.question)
         known = drift(self.at, None, setup.normal.moved) + CHAIN_ROUNDING * float(np.abs(points).max(initial=0.0))
         planes, nearest = list[Array](), np.inf
         self.spheres: list[tuple[Array, Array]] = []
@@ -125,13 +134,13 @@ class _Sliding:
                     along = isinstance(each, CameraObservation) and each.axis is not None
                     nearest = min(nearest, float(np.linalg.norm((place.foot if along else place.B) - place.C)))
         self.rows = np.array(planes).reshape(-1, model.nv)
-        self.slack = NUMBER_ROUNDING + MOVED * known / nearest
+        self.slack = NUMBER_ROUNDING + MOVED_AXIS_LEVER_MAX * known / nearest
         """Error of their entries."""
 
     def modes(self, formation: Formation, goal: FormedMode) -> FormedModes | None:
         """All modes of a rigid formation; None where the planes leave more than similarities, one of them perhaps cut
         by spheres, or that cannot be proved."""
-        group, (kernel, seen) = formation.group, kernel_basis(self.rows, 1.0)
+        group, (kernel, seen) = formation.group, compute_kernel_basis(self.rows, 1.0)
         more = kernel.shape[1] - len(formation.trivial)
         if not self.known or group is None or group.axes.shape[1] or more > bool(self.spheres) * (not group.scaled):
             return None
@@ -174,12 +183,12 @@ class _Sliding:
         cuts = [
             -2.0 * (v @ w) / (w @ w)
             for v, slopes in self.spheres
-            if np.linalg.norm(w := slopes @ line) > NAMED * self.at.model.length
+            if np.linalg.norm(w := slopes @ line) > NAMED_TWIST_TOL * self.at.model.length
         ]
         spread = float(np.ptp(cuts))
-        if spread > NAMED:  # no second point is on all spheres
+        if spread > NAMED_TWIST_TOL:  # no second point is on all spheres
             return []
-        if spread > VANISHES or abs(cuts[0]) <= NAMED:
+        if spread > LOCUS_DISTANCE_TOL or abs(cuts[0]) <= NAMED_TWIST_TOL:
             return None
         at = ClosedConfiguration.of(self.at.model, self.at.model.integrate(self.at.q, cuts[0] * line))
         bodies, _ = _nearest(at, self.at, self.question, group, tuple(goal.bodies))
@@ -214,12 +223,15 @@ def _nearest(
 ) -> tuple[Bodies, float]:
     """The bodies at a configuration, moved by a trivial motion to where the sensed points are nearest to the goal's,
     and how far points (characteristic lengths of the goal) and bodies that turn are from there."""
-    points, wanted = seen_at(at, observation_model)[1], seen_at(goal, observation_model)[1]
+    points, wanted = list_sensed_points(at, observation_model)[1], list_sensed_points(goal, observation_model)[1]
     s, R, t = group.nearest(points, wanted) if len(points) else (1.0, np.eye(3), np.zeros(3))
     found, off = Bodies(), float(np.abs(s * points @ R.T + t - wanted).max(initial=0.0)) / goal.model.length
     for body in bodies:
-        X, turns = at.pose(body), bool(np.abs(at.model.frames(at.q, (body,))[1][0][3:]).max(initial=0.0) > NAMED)
-        found[body] = pose(s * R @ X[:3, 3] + t, R @ X[:3, :3] if turns else X[:3, :3])
+        X, turns = (
+            at.pose(body),
+            bool(np.abs(at.model.frames(at.q, (body,))[1][0][3:]).max(initial=0.0) > NAMED_TWIST_TOL),
+        )
+        found[body] = build_pose(s * R @ X[:3, 3] + t, R @ X[:3, :3] if turns else X[:3, :3])
         off = max(off, float(np.abs(found[body][:3, :3] - goal.pose(body)[:3, :3]).max()))
     return found, off
 
@@ -229,14 +241,14 @@ def _search(
 ) -> FormedModes:
     """The modes that random starts lead to."""
     at = goal.configuration
-    model, rng, rank = at.model, np.random.default_rng(0), relation(at, observation_model).rank
+    model, rng, rank = at.model, np.random.default_rng(0), compute_relation(at, observation_model).rank
     held, modes, met = (
         FixedValuesTask.at(model, at.q, observation_model.reference, observation_model.observations),
         [goal],
         [1],
     )
     starts = closed = quiet = loose = 0
-    while starts < SEARCH_STARTS and quiet < SEARCH_QUIET:
+    while starts < MODE_SEARCH_STARTS_MAX and quiet < MODE_SEARCH_QUIET_STARTS_COUNT:
         starts += 1
         report("starts")
         far = np.pi if starts % 2 else rng.uniform(0.0, np.pi)
@@ -245,23 +257,24 @@ def _search(
                 model,
                 model.integrate(model.q0, rng.uniform(-far, far, model.nv)),
                 held,
-                tolerance=SOLVED,
-                iterations=SEARCH_ITERATIONS,
+                tolerance=CLOSURE_SOLVER_TOL,
+                iterations=MODE_SEARCH_ITERATIONS_MAX,
             )
         except UndefinedValue:  # along the path a point came to a camera's centre
             continue
-        if residual > CLOSED:
+        if residual > CLOSURE_RESIDUAL_TOL:
             continue
         closed, quiet = closed + 1, quiet + 1
         there = ClosedConfiguration.of(model, q)
-        if relation(there, observation_model).rank < rank:
+        if compute_relation(there, observation_model).rank < rank:
             loose += 1
             continue
         known = next(
             (
                 k
                 for k, mode in enumerate(modes)
-                if _nearest(there, mode.configuration, observation_model, group, formation.bodies)[1] <= SAME_RELATION
+                if _nearest(there, mode.configuration, observation_model, group, formation.bodies)[1]
+                <= RELATION_ANGLE_TOL
             ),
             None,
         )

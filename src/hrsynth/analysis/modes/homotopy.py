@@ -17,9 +17,15 @@ from pathlib import Path
 
 import numpy as np
 
-from ...budgets import HOMOTOPY_ROUNDS, HOMOTOPY_STEPS
+from ...budgets import HOMOTOPY_PATH_STEPS_MAX, HOMOTOPY_ROUNDS_MAX
 from ...geometry.vectors import Array
-from ...tolerances import FARTHEST, POLISHED, SAME_END, SAME_SINGULAR_END, SINGULAR_END
+from ...tolerances import (
+    ENDPOINT_DISTANCE_TOL,
+    SHARP_ENDPOINT_STEP_TOL,
+    SINGULAR_ENDPOINT_DISTANCE_TOL,
+    SINGULAR_ENDPOINT_VALUE_TOL,
+    SOLUTION_DISTANCE_MAX,
+)
 from .polynomials import Quadric
 from .study_coordinates import forms
 
@@ -79,8 +85,8 @@ def ends(
     lift = np.vstack([np.eye(4), _turning(wanted[[0, *resting]])]) if resting else np.eye(8)
     to = lift.T @ np.delete(wanted, [0, *resting] if resting else [], axis=0) @ lift
     start, x = _corners() if resting else _start()
-    found = _Sorted()
-    for number in range(HOMOTOPY_ROUNDS):
+    found = _UnitEndpoints()
+    for number in range(HOMOTOPY_ROUNDS_MAX):
         with np.errstate(all="ignore"):
             at = _normalise(_follow_paths(start * np.exp(1j * (1.2 + 2.0 * number)), to, x) @ lift.T)
             found = _sort_ends(wanted, at, found.sharp)
@@ -125,7 +131,7 @@ def _follow_paths(start: Array, wanted: Array, x: Array) -> Array:
         return _step(J, x, np.einsum("nij,nj->ni", J, x) / 2.0)
 
     active = np.arange(len(x))
-    for _ in range(HOMOTOPY_STEPS):
+    for _ in range(HOMOTOPY_PATH_STEPS_MAX):
         if not len(active):
             break
         at, now = x[active], t[active]
@@ -149,7 +155,7 @@ def _follow_paths(start: Array, wanted: Array, x: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class _Sorted:
+class _UnitEndpoints:
     """As :class:`PathEndpoints`, in unit vectors."""
 
     sharp: Sequence[Array] = ()
@@ -160,37 +166,41 @@ class _Sorted:
     loose: int = 0
 
 
-def _sort_ends(wanted: Array, x: Array, known: Sequence[Array]) -> _Sorted:
+def _sort_ends(wanted: Array, x: Array, known: Sequence[Array]) -> _UnitEndpoints:
     """Classify the endpoints (m, 8) of paths, with solutions that are ``known`` already."""
     left, (x, steps) = x, _newton(wanted, x, POLISHES)
-    infinite = _distance(x) > FARTHEST
-    sharp = ~infinite & (steps < POLISHED)
+    infinite = _distance(x) > SOLUTION_DISTANCE_MAX
+    sharp = ~infinite & (steps < SHARP_ENDPOINT_STEP_TOL)
     poses = _conjugates([*known, *x[sharp]])
     vague, misses, least = _gauss_newton(wanted, left[~infinite & ~sharp])
-    vague = vague[(misses < SAME_END) & (least < SINGULAR_END) & (_distance(vague) < FARTHEST)]
+    vague = vague[
+        (misses < ENDPOINT_DISTANCE_TOL)
+        & (least < SINGULAR_ENDPOINT_VALUE_TOL)
+        & (_distance(vague) < SOLUTION_DISTANCE_MAX)
+    ]
     groups: list[list[Array]] = []
     for each in vague:
-        group = next((group for group in groups if _apart(each, group[0]) < SAME_SINGULAR_END), [])
+        group = next((group for group in groups if _apart(each, group[0]) < SINGULAR_ENDPOINT_DISTANCE_TOL), [])
         groups += [] if group else [group]
         group.append(each)
     several = [group for group in groups if len(group) > 1]
     multiple = tuple(len(group) for group in several)
     far = left[infinite]
     lost = len(left) - len(far) - len(poses) - sum(multiple)
-    singular = [_turn_real(group[0], SAME_SINGULAR_END) for group in several]
-    return _Sorted(poses, singular, multiple, tuple(far), max(0, lost), len(groups) - len(several))
+    singular = [_turn_real(group[0], SINGULAR_ENDPOINT_DISTANCE_TOL) for group in several]
+    return _UnitEndpoints(poses, singular, multiple, tuple(far), max(0, lost), len(groups) - len(several))
 
 
 def _conjugates(x: Sequence[Array]) -> list[Array]:
     """Distinct vectors up to factors, each with its conjugate; real ones without imaginary parts."""
     found: list[Array] = []
     for each in map(_turn_real, x):
-        if all(_apart(each, other) > SAME_END for other in found):
+        if all(_apart(each, other) > ENDPOINT_DISTANCE_TOL for other in found):
             found += [each] if np.isrealobj(each) else [each, each.conj()]
     return found
 
 
-def _turn_real(x: Array, flat: float = SAME_END) -> Array:
+def _turn_real(x: Array, flat: float = ENDPOINT_DISTANCE_TOL) -> Array:
     """A vector with its largest entry made real; real if all others are then, but for ``flat``."""
     largest = x[np.argmax(np.abs(x))]
     x = x * (abs(largest) / largest)
@@ -226,7 +236,7 @@ def _gauss_newton(quadrics: Array, x: Array) -> tuple[Array, Array, Array]:
         J = _border(2.0 * np.einsum("kij,nj->nki", quadrics, x), x)
         F = np.einsum("nki,ni->nk", J, x) / 2.0
         F[:, -1] = 0.0
-        step = np.linalg.pinv(J, rcond=SINGULAR_END / 10.0) @ F[:, :, None]
+        step = np.linalg.pinv(J, rcond=SINGULAR_ENDPOINT_VALUE_TOL / 10.0) @ F[:, :, None]
         x = _normalise(x - step[:, :, 0])
     J = _border(2.0 * np.einsum("kij,nj->nki", quadrics, x), x)
     misses: Array = np.abs(np.einsum("nki,ni->nk", J[:, :-1], x)).max(axis=1, initial=0.0)

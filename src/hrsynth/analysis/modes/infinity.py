@@ -14,13 +14,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...geometry.vectors import Array
-from ...tolerances import FARTHEST, SAME_END
+from ...tolerances import ENDPOINT_DISTANCE_TOL, SOLUTION_DISTANCE_MAX
 from .polynomials import Polynomial, Quadric, krawczyk
 from .quadrics import PoseSystem, Within
 
-ROUNDS = 8
+ENDPOINT_NEWTON_STEPS_COUNT = 8
 """Newton's steps from the end of a path."""
-MARKS = 3
+ENDPOINT_COORDINATES_COUNT = 3
 """Coordinates that are tried."""
 
 
@@ -79,7 +79,7 @@ def beyond(part: PoseSystem, balls: Within, far: Array, wanted: int) -> int:
     distinct: near the ends ``far`` (m, 8) of paths, as (e, g). Other coordinates are tried until as many as ``wanted``
     are."""
     most = 0
-    for number in range(1, MARKS + 1):
+    for number in range(1, ENDPOINT_COORDINATES_COUNT + 1):
         most = max(most, _enclose_infinity(part, balls, far, np.exp(1j * number * np.arange(1, 5) ** 2)))
         if most >= wanted:
             break
@@ -101,7 +101,7 @@ def _enclose_infinity(part: PoseSystem, balls: Within, far: Array, mark: Array) 
     boxes: list[list[Any]] = []
     known: list[Array] = []
     for z in (_polish(rounded, start) for start in _starts(np.vstack([far, far.conj()]), mark, study)):
-        if not np.all(np.isfinite(z)) or any(np.abs(z - other).max() < SAME_END for other in known):
+        if not np.all(np.isfinite(z)) or any(np.abs(z - other).max() < ENDPOINT_DISTANCE_TOL for other in known):
             continue
         known.append(z)
         box = krawczyk(thick, [acb(v) for v in z.tolist()])
@@ -110,7 +110,7 @@ def _enclose_infinity(part: PoseSystem, balls: Within, far: Array, mark: Array) 
         # |e|² is at least 1/|mark|² = 1/4, and |e·e| = |e·g'|² / |κ|
         x = np.array(box[:8])
         size = float((x @ quadrics[0].A @ x).abs_upper()) ** 2 / float(box[8].abs_lower())
-        if 4.0 * size * FARTHEST < 1.0 and all(_clear(box, other) for other in boxes):
+        if 4.0 * size * SOLUTION_DISTANCE_MAX < 1.0 and all(_is_disjoint(box, other) for other in boxes):
             boxes.append(box)
     return len(boxes)
 
@@ -132,7 +132,7 @@ def _starts(far: Array, mark: Array, study: Array) -> Array:
 
 def _polish(equations: Sequence[Polynomial], z: Array) -> Array:
     """z after Newton's steps; not finite where it cannot go on."""
-    for _ in range(ROUNDS):
+    for _ in range(ENDPOINT_NEWTON_STEPS_COUNT):
         J: Array = np.array([equation.slopes(list(z)) for equation in equations], dtype=complex)
         F: Array = np.array([equation.value(list(z)) for equation in equations], dtype=complex)
         scale = np.abs(J).max(axis=1)
@@ -143,6 +143,6 @@ def _polish(equations: Sequence[Polynomial], z: Array) -> Array:
     return z
 
 
-def _clear(one: Sequence[Any], other: Sequence[Any]) -> bool:
+def _is_disjoint(one: Sequence[Any], other: Sequence[Any]) -> bool:
     """Return True if two boxes are disjoint."""
     return any(not (a - b).contains(0) for a, b in zip(one, other, strict=True))

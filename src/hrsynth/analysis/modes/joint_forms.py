@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...budgets import LARGEST_JOINT_FORMS, MOST_INFINITE
-from ...geometry.ranks import singular_decomposition
+from ...budgets import JOINT_FORMS_MAX, QUATERNION_POWERS_MAX
+from ...geometry.ranks import decompose_matrix
 from ...geometry.vectors import Array, hat
-from ...tolerances import RANK_OF_FORMS
+from ...tolerances import FORM_PIVOT_MIN_FRACTION
 from .pose_bound import PRIME, residues
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Counted:
+class ClosureCount:
     """At most ``most`` closings, from forms of the degrees ``t`` times Wᵏ."""
 
     most: int
@@ -47,23 +47,23 @@ def _degrees(system: CarriedPlatform, chosen: Sequence[CarriedCondition]) -> lis
     return [[each.degree(k, f) for k, f in enumerate(system.freedoms_)] for each in chosen]
 
 
-def closings_bound(system: CarriedPlatform, chosen: Sequence[CarriedCondition]) -> Counted | None:
+def closings_bound(system: CarriedPlatform, chosen: Sequence[CarriedCondition]) -> ClosureCount | None:
     """D of some conditions, as many as joints; None where there are infinitely many, or the forms would be too many."""
     steps, degrees = _steps(system.freedoms_), _degrees(system, chosen)
     # from these degrees on, were all zeros isolated, there are as many functionals as zeros
     t = [max(2 * by, -(-sum(column) // by) * by) for by, column in zip(steps, zip(*degrees, strict=True), strict=True)]
     joint = 0
-    while prod(d + 1 for d in t) <= LARGEST_JOINT_FORMS:
+    while prod(d + 1 for d in t) <= JOINT_FORMS_MAX:
         found = _dimensions(system, chosen, degrees, steps, t)
         for k, (one, other) in enumerate(pairwise(found)):
             if one == other:
-                return Counted(one, tuple(t), k)
+                return ClosureCount(one, tuple(t), k)
         t[joint % len(t)] += steps[joint % len(t)]
         joint += 1
     return None
 
 
-def eigenvalues(system: CarriedPlatform, chosen: Sequence[CarriedCondition], counted: Counted) -> Array:
+def eigenvalues(system: CarriedPlatform, chosen: Sequence[CarriedCondition], counted: ClosureCount) -> Array:
     """All closings q (n, joints), complex, to rounding: functionals on exp(i m q) and powers of slides that vanish on
     the multiples of the conditions, on which the multiplication by exp(i q), or by a slide, has them as eigenvalues."""
     from scipy.linalg import qr
@@ -80,9 +80,9 @@ def eigenvalues(system: CarriedPlatform, chosen: Sequence[CarriedCondition], cou
     matrix = np.array(rows)
     Q, upper, _ = qr(matrix.conj().T, pivoting=True)
     pivots = np.abs(np.diag(upper))
-    kernel = Q[:, int(np.sum(pivots > RANK_OF_FORMS * pivots[0])) :]
+    kernel = Q[:, int(np.sum(pivots > FORM_PIVOT_MIN_FRACTION * pivots[0])) :]
     lower = _within(sizes, steps, counted.k, np.zeros(len(t), dtype=int))
-    space = singular_decomposition(kernel[lower])[0][:, : counted.most]
+    space = decompose_matrix(kernel[lower])[0][:, : counted.most]
     place = {index: i for i, index in enumerate(lower)}
     home = [place[i] for i in _within(sizes, steps, counted.k + 1, np.zeros(len(t), dtype=int))]
     moved = [[place[i] for i in _within(sizes, steps, counted.k + 1, shift)] for shift in np.eye(len(t), dtype=int)]
@@ -143,7 +143,7 @@ def _dimensions(
     kernel, size = nmod_mat(np.vstack(rows).tolist(), PRIME).nullspace()
     columns = np.array([[int(v) for v in row[:size]] for row in kernel.table()], dtype=object).reshape(count, size)
     found = []
-    for k in range(MOST_INFINITE + 1):
+    for k in range(QUATERNION_POWERS_MAX + 1):
         left = [d - k * by for d, by in zip(t, least, strict=True)]
         if min(left) < 0:
             break

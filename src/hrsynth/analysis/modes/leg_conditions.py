@@ -8,20 +8,20 @@ from functools import partial
 
 import numpy as np
 
-from ...constraints.pattern import leg_ends
+from ...constraints.pattern import list_leg_ends
 from ...errors import UnsupportedLocus
 from ...geometry import lines
-from ...geometry.ranks import range_basis
-from ...geometry.vectors import Array, plane_axes
+from ...geometry.ranks import compute_range_basis
+from ...geometry.vectors import Array, build_plane_axes
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.locked_twists import carry_joint, leg_twists
+from ...kinematics.locked_twists import carry_joint, compute_leg_twists
 from ...kinematics.velocity_relation import ObservationModel
 from ...mechanism import JointType, Observation
 from ...mechanism.composites import WordEdge
 from ...mechanism.legs import Leg, LegDecomposition
 from ...mechanism.notation import Rods
 from ...mechanism.observations.direction import Direction
-from ...tolerances import CHAIN_ROUNDING, SAME_POINT, SAME_RELATION
+from ...tolerances import CHAIN_ROUNDING, POINT_DISTANCE_TOL, RELATION_ANGLE_TOL
 from ..measured import MeasuredRobot
 from .conditions import (
     AtAngle,
@@ -37,7 +37,7 @@ from .conditions import (
 from .leg_orientations import Known, groups, one_axis, orientations, two_axes
 from .loci import Circle, Line, Plane, Point, Quadrics, Reach, Revolution, Sphere, SweptCircle
 from .loci_from_joints import apart, place
-from .locked_chain import Chain, ChainBody, LocusNotDerived, chain
+from .locked_chain import Chain, ChainBody, LocusDerivationFailure, chain
 
 Branches = list[list[PoseCondition]]
 _Read = tuple[Branches, float]
@@ -60,7 +60,7 @@ class OriginAndUnit:
 def rigid_platform(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[str, OriginAndUnit]:
     """The one body on which all legs end, and lengths from where it is at the goal. Raises ``UnsupportedLocus``."""
     decomposition = measured.setup.decomposition
-    bodies = leg_ends(decomposition)
+    bodies = list_leg_ends(decomposition)
     if len(bodies) != 1 or decomposition.point is not None or decomposition.mechanism.couplings:
         raise UnsupportedLocus(
             measured.setup.robot.name, "its platform is not one rigid body whose pose the legs determine"
@@ -81,10 +81,10 @@ def leg_conditions(
     geometry was moved (m). ``plane``: the normal of a motion in a plane; ``kept``: True if the platform does not
     rotate. Raises ``UnsupportedLocus``."""
     own = [o for o in observation_model.observations if o.leg == leg.label]
-    twists = leg_twists(goal, leg, own, observation_model.reference)
+    twists = compute_leg_twists(goal, leg, own, observation_model.reference)
     count = (6 if plane is None else 3) - twists.shape[1]
     if kept:
-        count = 3 - twists.shape[1] + range_basis(twists[3:], 1.0)[1].value
+        count = 3 - twists.shape[1] + compute_range_basis(twists[3:], 1.0)[1].value
     if count <= 0:
         return [[]], 0.0
     path = decomposition.path(leg)
@@ -107,9 +107,9 @@ def leg_conditions(
                 try:
                     branches, radii = read(leg.label, each, count, tip, middle, plane)
                     return branches, found.moved + (radii if radii > CHAIN_ROUNDING * found.extent else 0.0)
-                except LocusNotDerived as error:
+                except LocusDerivationFailure as error:
                     reasons.append(str(error))
-        except LocusNotDerived as error:
+        except LocusDerivationFailure as error:
             reasons.append(str(error))
     raise UnsupportedLocus(
         decomposition.mechanism.name,
@@ -124,10 +124,10 @@ def _tips(decomposition: LegDecomposition, path: Sequence[WordEdge], goal: Close
     yield end
     if joints[-1].type is JointType.REVOLUTE:
         met = (
-            lines.meeting_point([(end, axes[0]), (at, each)], SAME_POINT * goal.model.length)
+            lines.find_meeting_point([(end, axes[0]), (at, each)], POINT_DISTANCE_TOL * goal.model.length)
             for at, own in others
             for each in own
-            if not lines.parallel(axes[0], each)
+            if not lines.is_parallel(axes[0], each)
         )
         yield from (at for at in met if at is not None)
 
@@ -168,13 +168,14 @@ class _Rods:
         carrier = len(found.bodies) - 3
         Q, axis = known[carrier], found.bodies[carrier].axis
         if Q is None and (axis is None or known[carrier - 1] is None):
-            raise LocusNotDerived("the link that carries its rods rotates")
-        if (Q is not None and np.abs(Q - np.eye(3)).max() > SAME_RELATION) or any(
-            Q is None and axis is not None and not lines.parallel(e / np.linalg.norm(e), axis) for e, _ in self.across
+            raise LocusDerivationFailure("the link that carries its rods rotates")
+        if (Q is not None and np.abs(Q - np.eye(3)).max() > RELATION_ANGLE_TOL) or any(
+            Q is None and axis is not None and not lines.is_parallel(e / np.linalg.norm(e), axis)
+            for e, _ in self.across
         ):
-            raise LocusNotDerived("the link that carries its rods rotates them")
-        if any(abs(float(e @ e - f @ f)) > SAME_RELATION * found.length**2 for e, f in self.across):
-            raise LocusNotDerived("its rods are not those of a parallelogram")
+            raise LocusDerivationFailure("the link that carries its rods rotates them")
+        if any(abs(float(e @ e - f @ f)) > RELATION_ANGLE_TOL * found.length**2 for e, f in self.across):
+            raise LocusDerivationFailure("its rods are not those of a parallelogram")
         return [
             ((self.along - e) / found.length, f / found.length, float((self.along - e) @ e) / found.length**2)
             for e, f in self.across
@@ -204,10 +205,12 @@ def _of_tip(
             turns = [_angle(reach, *two_axes(found, known))]
         elif missing == 2:
             d, c = one_axis(found, known)
-            turns = [*((a, c, 0.0) for a in plane_axes(d)), (d, c, 1.0)]
+            turns = [*((a, c, 0.0) for a in build_plane_axes(d)), (d, c, 1.0)]
         elif missing:
-            raise LocusNotDerived(f"{missing} conditions on the platform's rotation")
-        if not any(_alike(reach, other, found.length) and _same_turns(turns, others) for other, others in seen):
+            raise LocusDerivationFailure(f"{missing} conditions on the platform's rotation")
+        if not any(
+            _is_same_locus(reach, other, found.length) and _has_same_rotations(turns, others) for other, others in seen
+        ):
             seen.append((reach, turns))
     b = middle.point(tip)
     return [
@@ -216,22 +219,22 @@ def _of_tip(
     ], moved
 
 
-def _alike(one: Reach | Quadrics, other: Reach | Quadrics, length: float) -> bool:
-    return apart(one, other, length) <= SAME_RELATION
+def _is_same_locus(one: Reach | Quadrics, other: Reach | Quadrics, length: float) -> bool:
+    return apart(one, other, length) <= RELATION_ANGLE_TOL
 
 
 def _angle(reach: Reach | Quadrics, a: Array, c: Array, own: Array) -> tuple[Array, Array, float]:
     """a · R c = h, h that of the leg's own axes; a is exactly the direction of the tip's line where along that."""
-    if isinstance(reach, Line) and lines.parallel(a, reach.direction):
+    if isinstance(reach, Line) and lines.is_parallel(a, reach.direction):
         a = reach.direction * np.sign(a @ reach.direction)
     return a, c, float(own @ c)
 
 
-def _same_turns(one: list[tuple[Array, Array, float]], other: list[tuple[Array, Array, float]]) -> bool:
+def _has_same_rotations(one: list[tuple[Array, Array, float]], other: list[tuple[Array, Array, float]]) -> bool:
     return all(
         any(
-            bool(np.abs(s * a - b).max() <= SAME_RELATION and np.abs(c - d).max() <= SAME_RELATION)
-            and abs(s * h - k) <= SAME_RELATION
+            bool(np.abs(s * a - b).max() <= RELATION_ANGLE_TOL and np.abs(c - d).max() <= RELATION_ANGLE_TOL)
+            and abs(s * h - k) <= RELATION_ANGLE_TOL
             for s in (1, -1)
         )
         for (a, c, h), (b, d, k) in zip(one, other, strict=True)
@@ -291,7 +294,7 @@ def _in_motion(
         return [OnPlane(leg, b, none, v, float(v @ o))]
     if isinstance(reach, Circle):
         return [OnRevolution(leg, b, none, o, n, np.array([(reach.radius / middle.size) ** 2, 0.0, 0.0]))]
-    raise LocusNotDerived(f"a {type(reach).__name__.lower()} in a plane")
+    raise LocusDerivationFailure(f"a {type(reach).__name__.lower()} in a plane")
 
 
 def _profile(reach: Revolution, middle: OriginAndUnit) -> Array:
@@ -309,9 +312,10 @@ def _of_foot(leg: str, found: Chain, count: int, tip: Array, middle: OriginAndUn
             reach, radii = place(rest, own)
             moved = max(moved, radii)
             if (3 if plane is None else 2) - reach.freedoms != count:
-                raise LocusNotDerived("its proximal centre and its rotation of the platform")
+                raise LocusDerivationFailure("its proximal centre and its rotation of the platform")
             if not any(
-                _alike(reach, other, found.length) and np.linalg.norm(foot - at) <= SAME_RELATION * found.length
+                _is_same_locus(reach, other, found.length)
+                and np.linalg.norm(foot - at) <= RELATION_ANGLE_TOL * found.length
                 for other, at in seen
             ):
                 seen.append((reach, foot))
@@ -336,12 +340,12 @@ def _holds(
             leg, b, none, o, np.array([0.0, 0.0, 1.0]), np.array([(reach.radius / middle.size) ** 2, 0.0, -1.0])
         )
         return [*([OnMovingPlane(leg, b, reach.axis, o, 0.0)] if isinstance(reach, Circle) else []), ball]
-    raise LocusNotDerived(f"a {type(reach).__name__.lower()} of the platform that contains its proximal centre")
+    raise LocusDerivationFailure(f"a {type(reach).__name__.lower()} of the platform that contains its proximal centre")
 
 
 def chain_from_platform(found: Chain, known: Known) -> tuple[Array, Chain]:
     """Return the proximal centre (m), the place of the part after the last link of known orientation, and the chain
-    from the platform to it. Raises :class:`LocusNotDerived` if it contains an observation."""
+    from the platform to it. Raises :class:`LocusDerivationFailure` if it contains an observation."""
     last = max(k for k, Q in enumerate(known) if Q is not None)
     bodies = found.bodies[last:]
     if (
@@ -349,12 +353,12 @@ def chain_from_platform(found: Chain, known: Known) -> tuple[Array, Chain]:
         or len(bodies) < 2
         or any(body.slides or body.cranks for body in found.bodies[: last + 1])
     ):
-        raise LocusNotDerived("an observation or a carried link keeps it from being read from the platform")
+        raise LocusDerivationFailure("an observation or a carried link keeps it from being read from the platform")
     foot = found.bodies[0].point + sum(
         (Q @ body.shift for Q, body in zip(known[: last + 1], found.bodies, strict=False) if Q is not None), np.zeros(3)
     )
     if any(Q is None for Q in known[:last]):
-        raise LocusNotDerived("a link that rotates before its proximal centre")
+        raise LocusDerivationFailure("a link that rotates before its proximal centre")
     end = bodies[-1]
     new = [ChainBody(None, end.point + end.shift, -end.shift, end.slides)]
     for before, after in zip(bodies[-2::-1], bodies[:0:-1], strict=True):
@@ -373,17 +377,17 @@ def _in_plane(leg: str, found: Chain, count: int, tip: Array, middle: OriginAndU
         or bodies[0].slides
         or any(body.axis is None for body in bodies[1:])
     ):
-        raise LocusNotDerived("another chain of axes")
+        raise LocusDerivationFailure("another chain of axes")
     parts = groups([(k, body.axis) for k, body in enumerate(found.bodies) if body.axis is not None])
     if [len(part) for part in parts] != [1, 2, 1]:
-        raise LocusNotDerived("another chain of axes")
+        raise LocusDerivationFailure("another chain of axes")
     (_, t), n, (_, c) = parts[0][0], parts[1][0][1], parts[2][0]
     first, *inner, last = found.bodies[1:]
     flat = [first.shift, *(v for body in (first, *inner) for v in body.slides), *(body.shift for body in inner)]
-    small = SAME_RELATION * found.length
+    small = RELATION_ANGLE_TOL * found.length
     if (
-        not lines.perpendicular(n, t)
-        or not lines.perpendicular(n, c)
+        not lines.is_perpendicular(n, t)
+        or not lines.is_perpendicular(n, c)
         or any(abs(float(n @ v)) > small for v in flat)
         or np.linalg.norm(first.shift) > small
         or first.slides
@@ -391,5 +395,5 @@ def _in_plane(leg: str, found: Chain, count: int, tip: Array, middle: OriginAndU
         or np.linalg.norm(last.shift) > small
         or sum(len(body.slides) for body in inner) != 1
     ):
-        raise LocusNotDerived("axes that are not normal to each other")
+        raise LocusDerivationFailure("axes that are not normal to each other")
     return [[Coplanar(leg, middle.point(tip), c, middle.point(first.point), t)]], 0.0

@@ -18,9 +18,9 @@ from itertools import pairwise
 import numpy as np
 
 from ...geometry import lines
-from ...geometry.vectors import Array, cross, rotation_about
-from ...tolerances import EXACT, SAME_RELATION
-from .locked_chain import Chain, LocusNotDerived
+from ...geometry.vectors import Array, cross, rotate_about_axis
+from ...tolerances import EXACT_INCIDENCE_TOL, RELATION_ANGLE_TOL
+from .locked_chain import Chain, LocusDerivationFailure
 
 Known = tuple[Array | None, ...]
 """The orientation (3, 3) of each body, counted from the goal, or None where it is not a fixed one."""
@@ -86,7 +86,7 @@ def groups(way: Way) -> list[Way]:
     """A way cut where the axis changes its direction."""
     found: list[Way] = []
     for place, axis in way:
-        if found and lines.parallel(found[-1][-1][1], axis):
+        if found and lines.is_parallel(found[-1][-1][1], axis):
             found[-1].append((place, axis))
         else:
             found.append([(place, axis)])
@@ -107,12 +107,12 @@ def kept_angle(chain: Chain) -> tuple[Array, Array]:
     """Unit vectors a, fixed in the base, and c, of the chain's last body at the goal, whose angle the chain keeps:
     a · Q c = a · c, where all that turns the last body is axes along a, then axes along c.
 
-    Raises :class:`LocusNotDerived` where other axes turn it too, or where a differs between branches.
+    Raises :class:`LocusDerivationFailure` where other axes turn it too, or where a differs between branches.
     """
     found = [two_axes(chain, known) for known, _ in orientations(chain)]
     first = found[0]
-    if any(not _same(a, first[0]) for a, *_ in found):
-        raise LocusNotDerived("the axis with which its end keeps an angle differs between leg solutions")
+    if any(not _is_same_orientation(a, first[0]) for a, *_ in found):
+        raise LocusDerivationFailure("the axis with which its end keeps an angle differs between leg solutions")
     return first[:2]
 
 
@@ -122,7 +122,7 @@ def two_axes(chain: Chain, known: Known) -> tuple[Array, Array, Array]:
     goal."""
     base, parts = _turning(chain, known)
     if len(parts) != 2:
-        raise LocusNotDerived(f"{len(parts)} axes turn its end")
+        raise LocusDerivationFailure(f"{len(parts)} axes turn its end")
     return base @ parts[0][0][1], parts[1][0][1], parts[0][0][1]
 
 
@@ -130,7 +130,7 @@ def one_axis(chain: Chain, known: Known) -> tuple[Array, Array]:
     """The only direction about which the last body turns so, as it is fixed in the base, and at the goal."""
     base, parts = _turning(chain, known)
     if len(parts) != 1:
-        raise LocusNotDerived(f"{len(parts)} axes turn its end")
+        raise LocusDerivationFailure(f"{len(parts)} axes turn its end")
     return base @ parts[0][0][1], parts[0][0][1]
 
 
@@ -142,7 +142,7 @@ def _turning(chain: Chain, known: Known) -> tuple[Array, list[Way]]:
             base = Q
             break
         if body.axis is None and not body.watched:
-            raise LocusNotDerived("its end rotates freely")
+            raise LocusDerivationFailure("its end rotates freely")
         axes.append(body.watched[0] if body.axis is None else body.axis)
         if body.axis is None:
             break
@@ -154,13 +154,13 @@ def _driven_bodies(chain: Chain, known: Known) -> Iterator[_Found]:
     for k, body in enumerate(chain.bodies):
         Q, axis = known[k - 1], body.axis
         if body.angles and axis is not None and Q is not None:
-            yield _Found((k,), tuple(((Q @ rotation_about(axis, angle),), gain) for angle, gain in body.angles))
+            yield _Found((k,), tuple(((Q @ rotate_about_axis(axis, angle),), gain) for angle, gain in body.angles))
 
 
 def _watched_once(chain: Chain, known: Known) -> Iterator[_Found]:
     """A direction held behind one axis keeps all bodies up to it from turning, where it is not along that axis."""
     for Q, parts, d in _held_directions(chain, known):
-        if len(parts) == 1 and not lines.parallel(parts[0][0][1], d):
+        if len(parts) == 1 and not lines.is_parallel(parts[0][0][1], d):
             turn = _about(parts[0][0][1], d, Q.T @ d)
             place = parts[0][-1][0]
             if turn is None:
@@ -196,7 +196,7 @@ def _between_two(chain: Chain, known: Known) -> Iterator[_Found]:
     """One axis between two known bodies must be that of their turn; of two, each has one angle."""
     for Q, R, parts in _gaps(chain, known):
         M = Q.T @ R
-        if len(parts) == 1 and not _same(M @ parts[0][0][1], parts[0][0][1]):
+        if len(parts) == 1 and not _is_same_orientation(M @ parts[0][0][1], parts[0][0][1]):
             yield _Found((), ())
         elif len(parts) == 2:
             a, b = parts[0][0][1], parts[1][0][1]
@@ -221,17 +221,17 @@ def _about(axis: Array, start: Array, end: Array) -> tuple[Array, float] | None:
     """The turn about an axis that brings a unit vector to another, with its gain, or None.
 
     The angle is that of two vectors of length r normal to the axis, each off by at most 2 ε."""
-    if not _same(np.array([axis @ start]), np.array([axis @ end])):
+    if not _is_same_orientation(np.array([axis @ start]), np.array([axis @ end])):
         return None
-    if np.max(np.abs(start - end)) <= EXACT:
+    if np.max(np.abs(start - end)) <= EXACT_INCIDENCE_TOL:
         return np.eye(3), 1.0
     angle = math.atan2(float(axis @ cross(start, end)), float(start @ end - (axis @ start) * (axis @ end)))
-    return rotation_about(axis, angle), 3.0 + 4.0 / float(np.linalg.norm(cross(axis, start)))
+    return rotate_about_axis(axis, angle), 3.0 + 4.0 / float(np.linalg.norm(cross(axis, start)))
 
 
 def _cones(a: Array, b: Array, start: Array, end: Array) -> list[tuple[Array, Array, float]] | None:
     """All (R(a, α), R(b, β)) with R(a, α) R(b, β) start = end, with their gains, the one that turns nothing first; None
-    where α or β is free. Raises :class:`LocusNotDerived` where two solutions nearly coincide.
+    where α or β is free. Raises :class:`LocusDerivationFailure` where two solutions nearly coincide.
 
     z = R(b, β) start has b·z = b·start, a·z = a·end and is of length 1: z = p a + q b ± s a × b. Errors ε of a, b,
     start and end leave δα (a × end) + δβ (R(a, α) b × end) of at most 6 ε.
@@ -240,16 +240,16 @@ def _cones(a: Array, b: Array, start: Array, end: Array) -> list[tuple[Array, Ar
     sine = 1 - c * c
     p, q = (alpha - c * beta) / sine, (beta - c * alpha) / sine
     square = (1 - p * p - q * q - 2 * p * q * c) / sine
-    if square < -SAME_RELATION:
+    if square < -RELATION_ANGLE_TOL:
         return []
     s = math.sqrt(max(square, 0.0))
     found = []
     ends = [p * a + q * b + sign * s * cross(a, b) for sign in (1.0, -1.0)]
-    if any(lines.parallel(z, axis) for z in ends for axis in (a, b)):
+    if any(lines.is_parallel(z, axis) for z in ends for axis in (a, b)):
         return None
-    if EXACT < s <= SAME_RELATION:
-        raise LocusNotDerived("two of its solutions nearly coincide")
-    for z in sorted(ends[: 1 + (s > EXACT)], key=lambda z: float(np.linalg.norm(z - start))):
+    if EXACT_INCIDENCE_TOL < s <= RELATION_ANGLE_TOL:
+        raise LocusDerivationFailure("two of its solutions nearly coincide")
+    for z in sorted(ends[: 1 + (s > EXACT_INCIDENCE_TOL)], key=lambda z: float(np.linalg.norm(z - start))):
         second, first = _about(b, start, z), _about(a, z, end)
         if first is not None and second is not None:
             slopes = np.column_stack([cross(a, end), cross(first[0] @ b, end)])
@@ -258,5 +258,5 @@ def _cones(a: Array, b: Array, start: Array, end: Array) -> list[tuple[Array, Ar
     return found
 
 
-def _same(one: Array, other: Array) -> bool:
-    return bool(np.max(np.abs(one - other)) <= SAME_RELATION)
+def _is_same_orientation(one: Array, other: Array) -> bool:
+    return bool(np.max(np.abs(one - other)) <= RELATION_ANGLE_TOL)

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...errors import BadRequest
-from ...geometry.vectors import Array, cross, frozen, perpendicular
+from ...geometry.vectors import Array, cross, find_perpendicular, freeze_array
 from ...results import Value
-from ...tolerances import EXACT
+from ...tolerances import EXACT_INCIDENCE_TOL
 
 
-class _Checked(Value):
+class _CheckedLocus(Value):
     """Something through or about a ``centre``, whose vectors and radius are checked, directions of length one."""
 
     def __post_init__(self) -> None:
@@ -32,7 +32,7 @@ class _Checked(Value):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Point(_Checked):
+class Point(_CheckedLocus):
     """The tip is fixed at ``centre``, shape (3,)."""
 
     centre: Array
@@ -48,7 +48,7 @@ class Point(_Checked):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Line(_Checked):
+class Line(_CheckedLocus):
     """The tip is centre + s d, with d the unit vector along ``direction`` and s in metres."""
 
     centre: Array
@@ -66,7 +66,7 @@ class Line(_Checked):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Circle(_Checked):
+class Circle(_CheckedLocus):
     """The tip is centre + ρ (cos θ e₁ + sin θ e₂), with e₁ the part of ``start`` normal to ``axis`` and e₂ = n × e₁."""
 
     centre: Array
@@ -77,7 +77,7 @@ class Circle(_Checked):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "start", frozen(perpendicular(self.axis, self.start)))
+        object.__setattr__(self, "start", freeze_array(find_perpendicular(self.axis, self.start)))
 
     def at(self, parameter: float) -> Array:
         """The tip at θ = ``parameter``; shape (3,)."""
@@ -103,7 +103,7 @@ class Circle(_Checked):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Sphere(_Checked):
+class Sphere(_CheckedLocus):
     """The tip is at the distance ``radius`` from ``centre``."""
 
     centre: Array
@@ -118,7 +118,7 @@ class Sphere(_Checked):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Plane(_Checked):
+class Plane(_CheckedLocus):
     """The tip is in the plane through ``centre`` that the unit vector along ``normal`` is normal to."""
 
     centre: Array
@@ -131,7 +131,7 @@ class Plane(_Checked):
 
 
 @dataclass(frozen=True, eq=False)
-class Revolution(_Checked):
+class Revolution(_CheckedLocus):
     """The tip is at ``centre`` + y with |y|² − z² = f₀ + f₁ z + f₂ z², z = y · ``axis``: what a slide sweeps that is
     oblique to the axis about which it turns, a cone or a hyperboloid."""
 
@@ -150,7 +150,7 @@ class Revolution(_Checked):
 
 
 @dataclass(frozen=True, eq=False)
-class SweptCircle(_Checked):
+class SweptCircle(_CheckedLocus):
     """The tip is ``centre`` + a spoke of a circle about ``axis`` + s ``direction``, oblique to it: a cylinder; with
     ``other`` not zero the last is a spoke of a circle of that radius about the direction."""
 
@@ -203,12 +203,12 @@ def extent(curves: Sequence[Reach], tips: Array) -> float:
         spreads += [length(point - middle) for point in points]
     radii = [curve.radius for curve in curves if isinstance(curve, Circle | Sphere)]
     size = max([*spreads, *radii])
-    rounding = EXACT * max(length(curve.centre) for curve in curves)
+    rounding = EXACT_INCIDENCE_TOL * max(length(curve.centre) for curve in curves)
     return size if size > rounding else 1.0
 
 
 def _vector(values: ArrayLike) -> Array:
-    array = frozen(values)
+    array = freeze_array(values)
     if array.shape != (3,) or not np.isfinite(array).all():
         raise BadRequest("vector of a locus", np.asarray(values).tolist(), "three finite numbers")
     return array
@@ -226,4 +226,4 @@ def _unit(values: ArrayLike) -> Array:
     size = length(array)
     if not size > 0:
         raise BadRequest("direction of a locus", array.tolist(), "a nonzero vector")
-    return array if abs(size - 1.0) < 1e-15 else frozen(array / size)
+    return array if abs(size - 1.0) < 1e-15 else freeze_array(array / size)

@@ -14,10 +14,10 @@ import numpy as np
 
 from ...geometry import lines
 from ...geometry.vectors import Array
-from ...tolerances import CHAIN_ROUNDING, MOVED, RANK_GAP, SAME_POINT
+from ...tolerances import CHAIN_ROUNDING, MOVED_AXIS_LEVER_MAX, POINT_DISTANCE_TOL, RANK_GAP_MIN
 from .leg_orientations import Known, groups, orientations, ways
 from .loci import Circle, Line, Plane, Point, Quadrics, Reach, Revolution, Sphere, SweptCircle
-from .locked_chain import Chain, ChainBody, LocusNotDerived
+from .locked_chain import Chain, ChainBody, LocusDerivationFailure
 
 
 def reaches(chain: Chain) -> tuple[list[tuple[Reach, float]], float]:
@@ -25,24 +25,24 @@ def reaches(chain: Chain) -> tuple[list[tuple[Reach, float]], float]:
     in each (1 in the goal's own); and how far the leg's geometry was moved (m): what nearly meets, is parallel or at
     one point is taken to be so.
 
-    Raises :class:`LocusNotDerived`, also where two branches are nearly one: neither the same to 1e-10 nor 1e-7 apart.
-    """
+    Raises :class:`LocusDerivationFailure`, also where two branches are nearly one: neither the same to 1e-10 nor 1e-7
+    apart."""
     found: list[tuple[Reach, float]] = []
     moved = 0.0
     for known, gain in orientations(chain):
         reach, radii = place(chain, known)
         if isinstance(reach, Quadrics):
-            raise LocusNotDerived("two parts that move on a surface that is neither a plane nor a sphere")
+            raise LocusDerivationFailure("two parts that move on a surface that is neither a plane nor a sphere")
         moved = max(moved, radii)
         gap = min((apart(reach, other, chain.length) for other, _ in found), default=np.inf)
-        if gap > SAME_POINT:
+        if gap > POINT_DISTANCE_TOL:
             found.append((reach, gain * chain.extent / chain.length if found else 1.0))
-        elif gap > SAME_POINT / RANK_GAP:
-            raise LocusNotDerived(f"two of its solutions differ by only {gap:.1e} characteristic lengths")
+        elif gap > POINT_DISTANCE_TOL / RANK_GAP_MIN:
+            raise LocusDerivationFailure(f"two of its solutions differ by only {gap:.1e} characteristic lengths")
         else:
             moved = max(moved, gap * chain.length)
     moved = moved if moved > CHAIN_ROUNDING * chain.extent else 0.0
-    return found, MOVED * (chain.moved + moved)
+    return found, MOVED_AXIS_LEVER_MAX * (chain.moved + moved)
 
 
 @dataclass(eq=False)
@@ -82,35 +82,37 @@ class _Sum:
             self.moved += radius
 
     def reach(self) -> Reach | Quadrics:
-        """Its name. Raises :class:`LocusNotDerived` where it has none."""
+        """Its name. Raises :class:`LocusDerivationFailure` where it has none."""
         if self.sweeps:
             if len(self.sweeps) > 1 or self.spheres or self.circles or self.lines:
-                raise LocusNotDerived("a P that rotates about an axis oblique to it, and another part that moves")
+                raise LocusDerivationFailure(
+                    "a P that rotates about an axis oblique to it, and another part that moves"
+                )
             return Revolution.swept(self.centre, *self.sweeps[0])
         if self.spheres and (len(self.spheres) > 1 or self.circles or self.lines):
-            raise LocusNotDerived("a part that rotates freely and another that moves")
+            raise LocusDerivationFailure("a part that rotates freely and another that moves")
         if self.spheres:
             return Sphere(self.centre, self.spheres[0])
         if not self.circles and not self.lines:
             return Point(self.centre)
-        if not self.circles and all(lines.parallel(d, self.lines[0]) for d in self.lines):
+        if not self.circles and all(lines.is_parallel(d, self.lines[0]) for d in self.lines):
             return Line(self.centre, self.lines[0])
         if len(self.circles) == 1 and not self.lines:
             axis, spoke = self.circles[0]
             return Circle(self.centre, axis, float(np.linalg.norm(spoke)), spoke)
         first = [axis for axis, _ in self.circles] or [_normal(self.lines)]
         normal = first[0]
-        if all(lines.parallel(axis, normal) for axis in first) and all(
-            lines.perpendicular(d, normal) for d in self.lines
+        if all(lines.is_parallel(axis, normal) for axis in first) and all(
+            lines.is_perpendicular(d, normal) for d in self.lines
         ):
             self.tilt += sum(abs(float(d @ normal)) for d in self.lines)
             return Plane(self.centre, normal)
-        if len(self.circles) == 1 and all(lines.parallel(d, self.lines[0]) for d in self.lines):
+        if len(self.circles) == 1 and all(lines.is_parallel(d, self.lines[0]) for d in self.lines):
             return SweptCircle(self.centre, normal, float(np.linalg.norm(self.circles[0][1])), self.lines[0])
         if len(self.circles) == 2 and not self.lines:
             one, other = (float(np.linalg.norm(spoke)) for _, spoke in self.circles)
             return SweptCircle(self.centre, normal, one, first[1], other)
-        raise LocusNotDerived("circles and lines that lie in no common plane")
+        raise LocusDerivationFailure("circles and lines that lie in no common plane")
 
 
 def _normal(directions: Sequence[Array]) -> Array:
@@ -120,7 +122,7 @@ def _normal(directions: Sequence[Array]) -> Array:
 
 def place(chain: Chain, known: Known) -> tuple[Reach | Quadrics, float]:
     """The reach in one branch of orientations, and how far radii were moved (m)."""
-    total = _Sum(SAME_POINT * chain.length, chain.bodies[0].point)
+    total = _Sum(POINT_DISTANCE_TOL * chain.length, chain.bodies[0].point)
     for k, body in enumerate(chain.bodies):
         Q = known[k]
         if Q is not None:
@@ -131,8 +133,8 @@ def place(chain: Chain, known: Known) -> tuple[Reach | Quadrics, float]:
             _turns(total, body, *alone[0])
         elif body.watched:
             _spins(total, body)
-        elif not body.rigid:
-            raise LocusNotDerived("a link that rotates freely and carries a P or a parallelogram")
+        elif not body.is_rigid:
+            raise LocusDerivationFailure("a link that rotates freely and carries a P or a parallelogram")
         else:
             total.ball(body.shift)
     reach = total.reach()
@@ -153,7 +155,7 @@ def _rests(total: _Sum, body: ChainBody, Q: Array) -> None:
 def _crank(total: _Sum, Q: Array, axis: Array, vector: Array, watched: Sequence[Array]) -> None:
     """A crank that turns about a fixed direction, from the orientation Q of what carries it."""
     for d in watched:
-        if not lines.parallel(axis, d):
+        if not lines.is_parallel(axis, d):
             start, end = Q @ d, d
             angle = np.arctan2(axis @ np.cross(start, end), start @ end - (axis @ start) * (axis @ end))
             v = Q @ vector
@@ -169,23 +171,23 @@ def _turns(total: _Sum, body: ChainBody, Q: Array, a: Array) -> None:
     if (
         len(body.slides) == 1
         and not body.cranks
-        and not any(test(body.slides[0], a) for test in (lines.parallel, lines.perpendicular))
+        and not any(test(body.slides[0], a) for test in (lines.is_parallel, lines.is_perpendicular))
     ):
         total.sweeps.append((axis, Q @ body.shift, Q @ body.slides[0]))
         return
     total.turn(axis, Q @ body.shift)
     for slide in body.slides:
-        if lines.parallel(slide, a):
+        if lines.is_parallel(slide, a):
             total.lines.append(axis)
-        elif lines.perpendicular(slide, a):
+        elif lines.is_perpendicular(slide, a):
             first = Q @ slide
             total.lines += [first, np.cross(axis, first)]
             total.tilt += abs(float(slide @ a))
         else:
-            raise LocusNotDerived("a P that rotates about an axis oblique to it")
+            raise LocusDerivationFailure("a P that rotates about an axis oblique to it")
     for crank in body.cranks:
-        if crank.held or not lines.parallel(crank.axis, a):
-            raise LocusNotDerived("a parallelogram that rotates about another axis than its own")
+        if crank.held or not lines.is_parallel(crank.axis, a):
+            raise LocusDerivationFailure("a parallelogram that rotates about another axis than its own")
         _crank(total, Q, axis, crank.vector, crank.watched)
 
 
@@ -193,8 +195,10 @@ def _spins(total: _Sum, body: ChainBody) -> None:
     """A body with a direction held that turns about it."""
     d = body.watched[0]
     total.turn(d, body.shift)
-    if body.cranks or any(not lines.parallel(slide, d) for slide in body.slides):
-        raise LocusNotDerived("a link that spins about its observed direction and carries more than a P along it")
+    if body.cranks or any(not lines.is_parallel(slide, d) for slide in body.slides):
+        raise LocusDerivationFailure(
+            "a link that spins about its observed direction and carries more than a P along it"
+        )
     total.lines += [d] * len(body.slides)
 
 

@@ -15,8 +15,8 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from ...geometry import lines
-from ...geometry.screws import normals
-from ...geometry.vectors import Array, cross, unit
+from ...geometry.screws import find_normals
+from ...geometry.vectors import Array, cross, normalise_vector
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.locked_twists import carry_joint
 from ...mechanism import Joint, JointType, Observation
@@ -25,10 +25,10 @@ from ...mechanism.legs import Leg, LegDecomposition
 from ...mechanism.notation import Rods
 from ...mechanism.observations.direction import Direction
 from ...mechanism.observations.encoder import Encoder
-from ...tolerances import CHAIN_ROUNDING, RANK_GAP, SAME_DIRECTION, SAME_POINT
+from ...tolerances import CHAIN_ROUNDING, DIRECTION_SINE_TOL, POINT_DISTANCE_TOL, RANK_GAP_MIN
 
 
-class LocusNotDerived(Exception):
+class LocusDerivationFailure(Exception):
     """Locus of a locked leg's end that is not derived from its joints by the known laws; the text is the reason."""
 
 
@@ -61,7 +61,7 @@ class ChainBody:
     """The angles about the axis that a drive leaves to it, each with what it makes of an error; none if it is free."""
 
     @property
-    def rigid(self) -> bool:
+    def is_rigid(self) -> bool:
         """True if the next part is fixed in it."""
         return not self.slides and not self.cranks
 
@@ -99,15 +99,15 @@ def chain(
     end: Array | str,
 ) -> Chain:
     """The chain of a leg to its ``tip`` (3,); ``end`` is ``free``, ``kept`` (its body's orientation) or the normal of
-    the plane in which that turns. Raises :class:`LocusNotDerived`."""
+    the plane in which that turns. Raises :class:`LocusDerivationFailure`."""
     bodies, off = _Walk(decomposition, leg, held, goal).bodies(tip)
     if not isinstance(end, str):
         bodies = (*bodies, ChainBody(end, tip))
     for one, other in pairwise(bodies):
         if one.axis is not None and other.axis is not None:
             sine = float(np.linalg.norm(cross(one.axis, other.axis)))
-            if SAME_DIRECTION / RANK_GAP < sine < SAME_DIRECTION:
-                raise LocusNotDerived(f"two of its axes are only {sine:.1e} from parallel")
+            if DIRECTION_SINE_TOL / RANK_GAP_MIN < sine < DIRECTION_SINE_TOL:
+                raise LocusDerivationFailure(f"two of its axes are only {sine:.1e} from parallel")
     return Chain(bodies, end != "free" if isinstance(end, str) else True, goal.model.length, off)
 
 
@@ -124,7 +124,9 @@ def _parallel_angles(bodies: Sequence[ChainBody]) -> float:
         )
     ]
     angles = [
-        float(np.linalg.norm(cross(one, other))) for one, other in combinations(found, 2) if lines.parallel(one, other)
+        float(np.linalg.norm(cross(one, other)))
+        for one, other in combinations(found, 2)
+        if lines.is_parallel(one, other)
     ]
     return sum(angle for angle in angles if angle > CHAIN_ROUNDING)
 
@@ -146,7 +148,7 @@ class _Walk:
             elif isinstance(each, Direction) and (each.seen_from or decomposition.mechanism.reference) == base:
                 self.watched.setdefault(each.link, []).append(goal.pose(each.link)[:3, :3] @ each.direction)
             else:
-                raise LocusNotDerived("an observation is not a direction from the base")
+                raise LocusDerivationFailure("an observation is not a direction from the base")
 
     def bodies(self, tip: Array) -> tuple[tuple[ChainBody, ...], float]:
         """The bodies, shifts included, and how far their points were moved to meet (m); every measurement must be met
@@ -166,8 +168,8 @@ class _Walk:
             found[-1] = replace(found[-1], watched=found[-1].watched + self._sight(there))
             at = there
         for what in (*self.watched, *self.coordinates):
-            raise LocusNotDerived(f"the observation at {what} is not on the path from the base to the leg's end")
-        return _shift_bodies(found, tip, SAME_POINT * self.goal.model.length)
+            raise LocusDerivationFailure(f"the observation at {what} is not on the path from the base to the leg's end")
+        return _shift_bodies(found, tip, POINT_DISTANCE_TOL * self.goal.model.length)
 
     def _sight(self, link: str) -> tuple[Array, ...]:
         return tuple(self.watched.pop(link, ()))
@@ -182,15 +184,15 @@ class _Walk:
         held = self.coordinates.pop(joint.name, 0)
         if held:
             if held != len(axes) + (joint.type is JointType.CYLINDRICAL):
-                raise LocusNotDerived(f"a motor fixes a part of joint {joint.name}")
+                raise LocusDerivationFailure(f"a motor fixes a part of joint {joint.name}")
             return
         if joint.type is JointType.SPHERICAL:
             found.append(ChainBody(None, point))
             return
         if joint.type not in _TURNS:
-            raise LocusNotDerived(f"joint {joint.name} of type {joint.type.value}")
-        slides = axes if joint.type.slides else normals(axes[0]) if joint.type is JointType.PLANAR else ()
-        found[-1] = replace(found[-1], slides=(*found[-1].slides, *(unit(s) for s in slides)))
+            raise LocusDerivationFailure(f"joint {joint.name} of type {joint.type.value}")
+        slides = axes if joint.type.has_translation else find_normals(axes[0]) if joint.type is JointType.PLANAR else ()
+        found[-1] = replace(found[-1], slides=(*found[-1].slides, *(normalise_vector(s) for s in slides)))
         found.extend(ChainBody(axis, point) for axis in axes if _TURNS[joint.type])
         if joint.type is JointType.REVOLUTE and self.beside:
             found[-1] = replace(found[-1], angles=self._rod_angles(joint, at))
@@ -208,7 +210,7 @@ class _Walk:
                 continue
             c, d = (C - o - a * float(a @ (C - o)) for C in ends if C is not None)
             least = min(np.linalg.norm(c), np.linalg.norm(d)) / self.goal.model.length
-            if least > SAME_POINT:
+            if least > POINT_DISTANCE_TOL:
                 for name in [name for name in self.coordinates if name in self.beside]:
                     if any(part.issuperset(self.anatomy.mechanism.joints[name].links) for part in (rod, near, far)):
                         del self.coordinates[name]
@@ -251,7 +253,7 @@ class _Walk:
     def _rods(self, found: list[ChainBody], edge: WordEdge, at: str) -> None:
         """Add the observed one of parallel rods, or the first: all have one direction."""
         if any(name in self.coordinates for name in edge.joints):
-            raise LocusNotDerived("a motor fixes a rod")
+            raise LocusDerivationFailure("a motor fixes a rod")
         number = next((k for k, link in enumerate(edge.inside) if link in self.watched), 0)
         joints = [self.anatomy.mechanism.joints[name] for name in edge.joints[2 * number : 2 * number + 2]]
         near, far = joints if edge.tail == at else joints[::-1]
@@ -276,15 +278,15 @@ def _shift_bodies(bodies: Sequence[ChainBody], tip: Array, small: float) -> tupl
     they are from meeting (m)."""
     points, moved = [bodies[0].point], 0.0
     for k, body in enumerate(bodies[1:], 1):
-        before = bodies[k - 1] if bodies[k - 1].rigid and k > 1 else None
-        after = bodies[k + 1] if k + 1 < len(bodies) and body.rigid else None
+        before = bodies[k - 1] if bodies[k - 1].is_rigid and k > 1 else None
+        after = bodies[k + 1] if k + 1 < len(bodies) and body.is_rigid else None
         point, off = (
             (body.point, 0.0)
             if body.axis is None
-            else _meeting(body, before, after, tip if k + 1 == len(bodies) and body.rigid else None, small)
+            else _meeting(body, before, after, tip if k + 1 == len(bodies) and body.is_rigid else None, small)
         )
         points.append(point)
-        moved += off if off > CHAIN_ROUNDING * (small / SAME_POINT) else 0.0
+        moved += off if off > CHAIN_ROUNDING * (small / POINT_DISTANCE_TOL) else 0.0
     found = []
     for body, start, end in zip(bodies, points, [*points[1:], tip], strict=True):
         cranks = sum((crank.vector for crank in body.cranks), np.zeros(3))
@@ -300,13 +302,13 @@ def _meeting(
     assert body.axis is not None
     balls = [each.point for each in (before, after) if each is not None and each.axis is None]
     for point in [*balls, *([] if tip is None else [tip])]:
-        off = lines.distance(point, body.point, body.axis)
+        off = lines.measure_line_distance(point, body.point, body.axis)
         if off <= small:
-            return lines.foot(point, body.point, body.axis), off
+            return lines.project_to_line(point, body.point, body.axis), off
     for other in (before, after):
         if other is not None and other.axis is not None:
-            near, far = lines.common_perpendicular(body.point, body.axis, other.point, other.axis)
+            near, far = lines.find_common_perpendicular(body.point, body.axis, other.point, other.axis)
             off = float(np.linalg.norm(near - far))
-            if not lines.parallel(body.axis, other.axis) and off <= small:
+            if not lines.is_parallel(body.axis, other.axis) and off <= small:
                 return near, off
     return body.point, 0.0

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import HrsynthError, MissingExtra, SystemNotSolved, TooLarge, UnsupportedLocus
-from ...kinematics.assembly import of_links
+from ...errors import ExternalSolverFailure, HrsynthError, MissingExtra, TooLarge, UnsupportedLocus
+from ...kinematics.assembly import build_from_link_poses
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.pinocchio_model import PinocchioModel
 from ...mechanism.observations.encoder import Encoder
-from ...mechanism.sensors import encoders
+from ...mechanism.sensors import make_encoders
 from ..measured import MeasuredRobot
 from ..observed import ObservedRobot
 from .branches import Model, solve_all
@@ -46,7 +46,7 @@ def without_couplings(
         tied |= more
     try:
         loose = ObservedRobot.of(replace(setup.mechanism, couplings=(), observations=()))
-        at = of_links(PinocchioModel(loose.mechanism, goal.model.length), goal.pose)
+        at = build_from_link_poses(PinocchioModel(loose.mechanism, goal.model.length), goal.pose)
     except HrsynthError:
         return None
     links, joints = loose.mechanism.links, loose.mechanism.joints
@@ -62,7 +62,7 @@ def without_couplings(
         *(
             each
             for name in sorted(tied - held)
-            for each in encoders(loose.mechanism, loose.mechanism.joints[name], of.get(name, ""))
+            for each in make_encoders(loose.mechanism, loose.mechanism.joints[name], of.get(name, ""))
         ),
     )
     found = MeasuredRobot(loose, loose.measuring(seen))
@@ -103,22 +103,22 @@ def expected_modes(measured: MeasuredRobot, at: ClosedConfiguration) -> int:
     if these are not known."""
     try:
         return most_posed(measured, at)
-    except (UnsupportedLocus, SystemNotSolved):
+    except (UnsupportedLocus, ExternalSolverFailure):
         return sys.maxsize
 
 
 def count_modes(measured: MeasuredRobot, at: ClosedConfiguration) -> SystemModes:
     """List the modes with the measured values at a configuration, without near ones, and not read as poses of the
-    robot's legs: as :func:`modes`, for many configurations of one robot that observes all its dof."""
+    robot's legs: as :func:`format_modes`, for many configurations of one robot that observes all its dof."""
     found = None
     if measured.generic_pattern.motion != "oriented":
-        with suppress(UnsupportedLocus, SystemNotSolved, TooLarge, MissingExtra):
+        with suppress(UnsupportedLocus, ExternalSolverFailure, TooLarge, MissingExtra):
             found = solve_all(all_loci(measured, at)[0], near=False)[1]
     if found is not None and found.complete:
         return found
     try:
         return solve_posed(measured, at)[1]
-    except (UnsupportedLocus, SystemNotSolved):
+    except (UnsupportedLocus, ExternalSolverFailure):
         if found is None:
             raise
         return found

@@ -9,23 +9,23 @@ from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
-from ...batch.pose_continuation import reach
-from ...budgets import EFFORT
-from ...constraints.pattern import placing_links
-from ...errors import BadRequest, MissingExtra, PoseNotReached, SystemNotSolved, TooLarge, UnsupportedLocus
-from ...kinematics.assembly import Assembly, of_links
+from ...batch.pose_continuation import track_to_pose
+from ...budgets import MODES_TIME_LIMIT_S
+from ...constraints.pattern import list_placing_links
+from ...errors import BadRequest, ExternalSolverFailure, MissingExtra, PoseReachFailure, TooLarge, UnsupportedLocus
+from ...kinematics.assembly import Assembly, build_from_link_poses
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.joint_coordinates import reach_joints
-from ...kinematics.limits import outside
+from ...kinematics.joint_coordinates import track_to_joints
+from ...kinematics.limits import list_joints_beyond
 from ...kinematics.tasks import Task
 from ...kinematics.velocity_relation import ObservationModel
 from ...mechanism.observation import Observation
-from ...mechanism.pose import JointPose, ModeNumber, Pose, PoseLike, asked_pose
+from ...mechanism.pose import JointPose, ModeNumber, Pose, PoseLike, parse_pose
 from ...options import option
 from ...progress import report
 from ...records import FLAT, OPTIONAL, As, Shown, recorded
 from ...results import Result
-from ...tolerances import MEASUREMENT_BOUND, SAME_NEAR_POSE
+from ...tolerances import MEASUREMENT_BOUND, NEAR_POSE_DIFFERENCE_TOL
 from ..analysis_declaration import analysis
 from ..formation import Formation
 from ..measured import MeasuredRobot
@@ -41,7 +41,7 @@ from .near import NearMode, measurement_bound, near_modes, poses_alike
 from .planar_loops import PlanarLoops
 from .planar_modes import solve_loops
 from .pose_conditions_solver import PosedPlatform, solve_posed
-from .search import FoundMode, leaves_free, search
+from .search import FoundMode, has_unobserved_motion, search
 from .self_motions import SelfMotion, self_motion
 from .single_loop import solve_loop
 from .solve import SystemModes, continuum
@@ -273,7 +273,7 @@ def modes(
             "SECONDS",
             low=0,
         ),
-    ] = EFFORT,
+    ] = MODES_TIME_LIMIT_S,
     seed: Seed = 0,
 ) -> AssemblyModes:
     """List assembly modes: poses of the platform with the same measured values, and whether they are proved to be all.
@@ -307,7 +307,7 @@ def modes(
     ------
     BadRequest
         If a name or a part of a pose is unknown.
-    PoseNotReached
+    PoseReachFailure
         If the pose is out of reach.
     GeometryAmbiguous
         If it is not clear whether a geometry is special.
@@ -335,17 +335,17 @@ def modes(
     setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed, driven=real)
     if setup.robot.formation:
         return _modes_of_formation(setup, at, real)
-    asked = None if at is None or isinstance(at, ClosedConfiguration) else asked_pose(at)
+    asked = None if at is None or isinstance(at, ClosedConfiguration) else parse_pose(at)
     if isinstance(asked, ModeNumber):
         at, asked = at_mode(modes(setup), asked), None
     elif isinstance(asked, JointPose):
-        at, asked = reach_joints(setup.all_samples.start, setup.motion, asked), None
+        at, asked = track_to_joints(setup.all_samples.start, setup.motion, asked), None
     setup = setup if asked is None else setup.telling([asked])
     motion, wanted = setup.motion, None
     goal = at if isinstance(at, ClosedConfiguration) else setup.all_samples.start
     if asked is not None:
         wanted = motion.goal(asked, setup.robot.name)
-        goal = reach(goal, setup.all_samples.observation_model, asked, motion)
+        goal = track_to_pose(goal, setup.all_samples.observation_model, asked, motion)
     measured = MeasuredRobot.of(setup, real)
     found = _list_modes(setup, measured, goal, wanted, real, as_written, time_limit)
     near = near_modes(setup, goal, measured.observation_model, found.modes, found.candidates, bound)
@@ -368,7 +368,7 @@ def _list_modes(
     free = setup.dof - measured.rank
     if free:
         text = f"the {'motors' if real else 'measured values'} leave {free} of the platform's dof undetermined"
-        own = self_motion(goal, measured.observation_model, placing_links(setup.decomposition), goal=True)
+        own = self_motion(goal, measured.observation_model, list_placing_links(setup.decomposition), goal=True)
         return AssemblyModes(
             setup,
             kind,
@@ -380,18 +380,18 @@ def _list_modes(
         )
     report("modes")
     try:
-        if not as_written and _moves(setup, measured.observation_model, goal):
+        if not as_written and _is_on_self_motion(setup, measured.observation_model, goal):
             return _modes_by_search(
                 setup, measured.observation_model, goal, pose, kind, "the pose lies on a self-motion"
             )
         listed = _modes_by_system(setup, measured, goal, wanted, pose, kind, as_written, time_limit)
-    except (UnsupportedLocus, SystemNotSolved, TooLarge, MissingExtra) as error:
+    except (UnsupportedLocus, ExternalSolverFailure, TooLarge, MissingExtra) as error:
         return _modes_by_search(setup, measured.observation_model, goal, pose, kind, error.reason)
     moving = (
         not listed.found.complete
         and not as_written
         and any(
-            mode.configuration is not None and _moves(setup, measured.observation_model, mode.configuration)
+            mode.configuration is not None and _is_on_self_motion(setup, measured.observation_model, mode.configuration)
             for mode in listed.modes
         )
     )
@@ -434,7 +434,7 @@ def _modes_of_formation(setup: ObservedRobot, where: object, real: bool) -> Asse
     listed = list[AssemblyMode]()
     for each in found.modes:
         at = each.configuration
-        whole = Assembly(at, (), tuple(outside(at.model, at.q)))
+        whole = Assembly(at, (), tuple(list_joints_beyond(at.model, at.q)))
         listed.append(
             AssemblyMode(
                 Pose.of(each.bodies[first]),
@@ -469,7 +469,7 @@ def _modes_of_formation(setup: ObservedRobot, where: object, real: bool) -> Asse
 
 def at_mode(listed: AssemblyModes | None, asked: ModeNumber) -> ClosedConfiguration:
     """Return the robot assembled at one of its modes, its coordinates relative to the zero configuration; raises
-    ``BadRequest``, ``PoseNotReached``."""
+    ``BadRequest``, ``PoseReachFailure``."""
     assert listed is not None
     name, count = listed.setup.robot.name, len(listed.modes)
     if not 1 <= asked.number <= count:
@@ -485,21 +485,21 @@ def at_mode(listed: AssemblyModes | None, asked: ModeNumber) -> ClosedConfigurat
     at = listed.goal if mode.goal else mode.configuration
     if at is None:
         left = " and ".join(f"{noun} {', '.join(names)}" for noun, names in mode.left_open)
-        raise PoseNotReached(
+        raise PoseReachFailure(
             name,
             f"{asked} ({mode.pose})",
             0.0,
             str(listed.pose),
             reason=f"the robot was not found assembled there: {left} not closed",
         )
-    return at if at.model is listed.goal.model else of_links(listed.goal.model, at.pose)
+    return at if at.model is listed.goal.model else build_from_link_poses(listed.goal.model, at.pose)
 
 
-def _moves(setup: ObservedRobot, observation_model: ObservationModel, at: ClosedConfiguration) -> bool:
+def _is_on_self_motion(setup: ObservedRobot, observation_model: ObservationModel, at: ClosedConfiguration) -> bool:
     """Return True if a closed configuration is on a self-motion that can be followed."""
     return (
-        leaves_free(at, observation_model)
-        and self_motion(at, observation_model, placing_links(setup.decomposition)) is not None
+        has_unobserved_motion(at, observation_model)
+        and self_motion(at, observation_model, list_placing_links(setup.decomposition)) is not None
     )
 
 
@@ -512,7 +512,7 @@ def _modes_by_search(
     reason: str,
 ) -> AssemblyModes:
     """List the modes that a search finds, with the reason why no list can be complete."""
-    done = search(goal, observation_model, placing_links(setup.decomposition))
+    done = search(goal, observation_model, list_placing_links(setup.decomposition))
     size = max((motion.dimension for motion in done.self_motions), default=None)
     found = SystemModes(
         None,
@@ -552,7 +552,7 @@ def _modes_by_system(
 ) -> AssemblyModes:
     """List the modes as the solutions of the system of the tips' loci, or else of the conditions of the legs'
     joints."""
-    reasons, large = list[UnsupportedLocus | SystemNotSolved | TooLarge | MissingExtra](), None
+    reasons, large = list[UnsupportedLocus | ExternalSolverFailure | TooLarge | MissingExtra](), None
     answers = list[tuple[Model, SystemModes]]()
     exact, better = drift(goal, wanted, setup.normal.moved), None
     free = without_couplings(measured, goal)
@@ -564,14 +564,14 @@ def _modes_by_system(
     for listed in (*first, solve_carried, solve_loop):
         if better is not None and listed not in better:
             continue
-        if listed is not solve_loops and not setup.decomposition.decided:
+        if listed is not solve_loops and not setup.decomposition.is_platform_decided:
             reasons.append(UnsupportedLocus(setup.robot.name, "joints inside its platform allow several poses of it"))
             continue
         try:
             answers.append(listed(*((measured, goal) if free is None or listed is solve_loops else free), exact))
-        except (UnsupportedLocus, SystemNotSolved, TooLarge, MissingExtra) as error:
+        except (UnsupportedLocus, ExternalSolverFailure, TooLarge, MissingExtra) as error:
             reasons.append(error)
-            large = error if listed is solve_loops and isinstance(error, SystemNotSolved) else large
+            large = error if listed is solve_loops and isinstance(error, ExternalSolverFailure) else large
         else:
             if answers[-1][1].complete:
                 better = () if better else better_ways(answers[-1][0])
@@ -587,7 +587,7 @@ def _modes_by_system(
     at_goal = min(found.modes, key=reader.away, default=None)
     ordered = sorted(found.modes, key=lambda mode: mode is not at_goal)
     read = [reader.read(mode, mode is at_goal) for mode in ordered]
-    near = [reader.read(mode, False) for mode in found.near if reader.away(mode) > SAME_NEAR_POSE]
+    near = [reader.read(mode, False) for mode in found.near if reader.away(mode) > NEAR_POSE_DIFFERENCE_TOL]
     return AssemblyModes(
         setup,
         kind,

@@ -25,7 +25,7 @@ PRIME = (1 << 62) - 87
 ROOT = pow(5, (PRIME - 1) // 4, PRIME)
 """A square root of -1 modulo the prime."""
 
-GROUPINGS = 3
+LOOP_UNKNOWN_GROUPINGS_MAX = 3
 """Ways to group the unknowns of loops that are tried."""
 
 Form = dict[tuple[int, ...], Any]
@@ -99,7 +99,7 @@ class Residues:
     def most_by_ranks(self, enough: int) -> int | None:
         """The least bound by ranks of multiples, the first that is ``enough``, in the groups of the least degrees."""
         groupings = sorted(partitions(list(range(self.n))), key=lambda groups: bezout(self.forms, groups))
-        return _least(self.forms, groupings[:GROUPINGS], enough) if self.n else 1
+        return _least(self.forms, groupings[:LOOP_UNKNOWN_GROUPINGS_MAX], enough) if self.n else 1
 
 
 def bezout(forms: Sequence[Form], groups: Sequence[Sequence[int]]) -> int:

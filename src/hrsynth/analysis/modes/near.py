@@ -13,20 +13,27 @@ from typing import Annotated
 
 import numpy as np
 
-from ...budgets import NEAR_MODE_STEPS
-from ...errors import LoopsNotClosed
-from ...geometry.so3 import angle_of
+from ...budgets import NEAR_MODE_STEPS_MAX
+from ...errors import LoopClosureFailure
+from ...geometry.so3 import compute_rotation_angle
 from ...geometry.vectors import Array
-from ...kinematics.assembly import of_links
+from ...kinematics.assembly import build_from_link_poses
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.tasks import FixedValuesTask, shorten_step, solve
-from ...kinematics.velocity_relation import ObservationModel, platform_motions, relation
-from ...options import plain_number
+from ...kinematics.velocity_relation import ObservationModel, compute_platform_motions, compute_relation
+from ...options import parse_plain_number
 from ...records import As, Recorded
 from ...results import Value
-from ...tolerances import CURVATURE_STEP, FAMILY_STEP, SAME_GEOMETRY, SAME_NEAR_POSE, SOLVED, SURELY_SOMETHING
-from ..accuracy.measurement_bounds import single_angle
+from ...tolerances import (
+    CLOSURE_SOLVER_TOL,
+    CONTINUOUS_FAMILY_STEP_MAX,
+    CURVATURE_DIFFERENCE_STEP_MAX,
+    GEOMETRY_DIFFERENCE_TOL,
+    NEAR_POSE_DIFFERENCE_TOL,
+    NONZERO_SINGULAR_VALUE_MIN,
+)
+from ..accuracy.measurement_bounds import require_single_angle
 from ..observed import ObservedRobot
 from .assembly_mode import AssemblyMode, found_mode
 from .self_motions import bodies_apart
@@ -52,7 +59,7 @@ class NearMode(AssemblyMode):
         """Largest difference of a measured value, and the distance of the pose, as text."""
         far = (
             f"at {1e3 * self.distance:.3g} mm"
-            if self.distance > SAME_NEAR_POSE * self.length
+            if self.distance > NEAR_POSE_DIFFERENCE_TOL * self.length
             else (f"rotated by {np.degrees(self.turned):.3g}°")
         )
         return f"by {degrees(self.angle)}, {far}"
@@ -78,25 +85,26 @@ def descend(
     (rad)."""
     at, model = start, start.model
     error, motions, rates = _changes(at, held)
-    for _ in range(NEAR_MODE_STEPS):
+    for _ in range(NEAR_MODE_STEPS_MAX):
         step = motions @ np.linalg.lstsq(rates, -error, rcond=None)[0]
-        q, _ = solve(model, model.integrate(at.q, shorten_step(step, 0.5)), tolerance=SOLVED)
+        q, _ = solve(model, model.integrate(at.q, shorten_step(step, 0.5)), tolerance=CLOSURE_SOLVER_TOL)
         try:
             at = ClosedConfiguration.of(model, q)
-        except LoopsNotClosed:
+        except LoopClosureFailure:
             return None
         error, motions, rates = _changes(at, held)
-        if float(np.abs(step).max(initial=0.0)) < SAME_GEOMETRY:
+        if float(np.abs(step).max(initial=0.0)) < GEOMETRY_DIFFERENCE_TOL:
             break
     else:
         return None
-    angle, there = _largest(error, held), relation(at, observation_model)
-    if there.rank == there.dof.value and there.seen.weakest >= SURELY_SOMETHING:
+    angle, there = _largest(error, held), compute_relation(at, observation_model)
+    if there.rank == there.dof.value and there.seen.weakest >= NONZERO_SINGULAR_VALUE_MIN:
         return StationaryPose(at, angle, bool(_loop_rates(at, held, motions, rates).min(initial=1.0) > 0.0), False)
-    moving = platform_motions(at, observation_model)
+    moving = compute_platform_motions(at, observation_model)
     way = moving @ np.linalg.svd(held.error_and_jacobian(model, at.q)[1] @ moving)[2][-1]
     beside = (
-        solve(model, model.integrate(at.q, step * way), tolerance=SOLVED)[0] for step in (FAMILY_STEP, -FAMILY_STEP)
+        solve(model, model.integrate(at.q, step * way), tolerance=CLOSURE_SOLVER_TOL)[0]
+        for step in (CONTINUOUS_FAMILY_STEP_MAX, -CONTINUOUS_FAMILY_STEP_MAX)
     )
     return StationaryPose(
         at, angle, False, all(_largest(held.error_and_jacobian(model, q)[0], held) <= bound for q in beside)
@@ -115,7 +123,7 @@ def _changes(at: ClosedConfiguration, held: FixedValuesTask) -> tuple[Array, Arr
     error, rates = held.error_and_jacobian(at.model, at.q)
     kernel = at.kernel()[0]
     _, sizes, ways = np.linalg.svd(rates @ kernel, full_matrices=False)
-    motions = kernel @ ways[sizes > SURELY_SOMETHING].T
+    motions = kernel @ ways[sizes > NONZERO_SINGULAR_VALUE_MIN].T
     return error, motions, rates @ motions
 
 
@@ -126,11 +134,13 @@ def _loop_rates(at: ClosedConfiguration, held: FixedValuesTask, motions: Array, 
     bends = np.zeros((motions.shape[1],) * 2)
     for k, way in enumerate(motions.T):
         for sign in (1.0, -1.0):
-            q, _ = solve(model, model.integrate(at.q, sign * CURVATURE_STEP * way), tolerance=SOLVED)
+            q, _ = solve(
+                model, model.integrate(at.q, sign * CURVATURE_DIFFERENCE_STEP_MAX * way), tolerance=CLOSURE_SOLVER_TOL
+            )
             J = model.jacobian(q)
             error, slopes = held.error_and_jacobian(model, q)
-            carried = motions - np.linalg.pinv(J, rcond=SURELY_SOMETHING) @ (J @ motions)
-            bends[k] += sign * (error @ slopes @ carried) / (2 * CURVATURE_STEP)
+            carried = motions - np.linalg.pinv(J, rcond=NONZERO_SINGULAR_VALUE_MIN) @ (J @ motions)
+            bends[k] += sign * (error @ slopes @ carried) / (2 * CURVATURE_DIFFERENCE_STEP_MAX)
     return np.asarray(np.sort(np.linalg.eigvals(np.linalg.solve(rates.T @ rates, (bends + bends.T) / 2)).real))
 
 
@@ -154,7 +164,10 @@ def near_modes(
             continue
         bodies = near.bodies or {}
         others = [{body: goal.pose(body) for body in bodies}, *(each.bodies or {} for each in (*known, *found))]
-        if all(bodies_apart(bodies, other, observation_model, goal.model.length) > SAME_NEAR_POSE for other in others):
+        if all(
+            bodies_apart(bodies, other, observation_model, goal.model.length) > NEAR_POSE_DIFFERENCE_TOL
+            for other in others
+        ):
             found.append(near)
     families = [each for each in found if each.family]
     return tuple(sorted((each for each in found if each not in families[1:]), key=lambda each: each.angle))
@@ -172,8 +185,8 @@ def _near(
     angle, stable, family = mode.residual, None, False
     if mode.configuration is not None:
         try:
-            start = of_links(goal.model, mode.configuration.pose)
-        except LoopsNotClosed:
+            start = build_from_link_poses(goal.model, mode.configuration.pose)
+        except LoopClosureFailure:
             return None
         least = descend(start, observation_model, held, bound)
         if least is None or not (least.isolated or least.family):
@@ -217,14 +230,14 @@ def distance_from(motion: PlatformMotion, goal: ClosedConfiguration, mode: Assem
     home, there = goal.pose(motion.link), mode.pose
     at = np.array([there.x, there.y, there.z], dtype=float)
     return float(np.linalg.norm(at - motion.position(home))), (
-        0.0 if there.rotation is None else angle_of(there.rotation @ home[:3, :3].T)
+        0.0 if there.rotation is None else compute_rotation_angle(there.rotation @ home[:3, :3].T)
     )
 
 
 def measurement_bound(cone: float | str) -> float:
     """Return a measurement bound (rad) as a user writes it, 0 for none; raises ``BadRequest``."""
     try:
-        exact = plain_number(str(cone).removesuffix("deg").strip()) == 0
+        exact = parse_plain_number(str(cone).removesuffix("deg").strip()) == 0
     except ValueError:
         exact = False
-    return 0.0 if exact else single_angle(cone)
+    return 0.0 if exact else require_single_angle(cone)

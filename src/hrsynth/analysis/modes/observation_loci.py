@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...constraints.pattern import leg_ends, recognise
+from ...constraints.pattern import list_leg_ends, recognise
 from ...errors import UndefinedValue, UnsupportedLocus
-from ...geometry.vectors import Array, inverse, transform
+from ...geometry.vectors import Array, invert_pose, transform
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.velocity_relation import ObservationModel
 from ...mechanism import Observation
@@ -21,10 +21,10 @@ from ...mechanism.cameras import CameraObservation, FixedValueLocus
 from ...mechanism.legs import LegDecomposition
 from ...mechanism.observations.direction import Direction, SeenAxis
 from ...mechanism.observations.encoder import Encoder
-from ...tolerances import CHAIN_ROUNDING, EXACT, MOVED, SAME_SENSE
+from ...tolerances import CHAIN_ROUNDING, EXACT_INCIDENCE_TOL, MEASURED_VALUE_TOL, MOVED_AXIS_LEVER_MAX
 from ..measured import MeasuredRobot
 from .conditions import AtAngle, OnMovingPlane, OnPlane, OnRevolution, PoseCondition
-from .goal_error import LEVER
+from .goal_error import ROTATION_LEVER_MIN
 from .leg_conditions import OriginAndUnit
 from .loci import Circle, Line, Plane, Point, Reach, Sphere
 from .tips import KeptAngle, Tip, TipLoci, tip_loci
@@ -51,9 +51,9 @@ class PlatformObservation:
         body = goal.pose(self.body)[:3, 3]
         far = max(float(np.linalg.norm(point - body)) for point in points) / goal.model.length
         spread = max(float(np.linalg.norm(each.place - each.through)) for each in self.loci if not each.turns)
-        bent = 1.0 + (goal.model.length * (1.0 + far) / spread if spread > EXACT else 0.0)
+        bent = 1.0 + (goal.model.length * (1.0 + far) / spread if spread > EXACT_INCIDENCE_TOL else 0.0)
         rounding = CHAIN_ROUNDING * max(float(np.linalg.norm(point)) for point in points)
-        return MOVED * (exact * max(1.0, far / LEVER) + rounding) * bent
+        return MOVED_AXIS_LEVER_MAX * (exact * max(1.0, far / ROTATION_LEVER_MIN) + rounding) * bent
 
 
 def sights(
@@ -61,13 +61,13 @@ def sights(
 ) -> tuple[ObservationModel, tuple[PlatformObservation, ...]]:
     """Return the observations of legs, by their labels, and the others. Raises ``UnsupportedLocus`` if the locus of an
     observation is not known, or if it is neither of a leg nor between base and platform."""
-    base, bodies = decomposition.mechanism.base, leg_ends(decomposition)
+    base, bodies = decomposition.mechanism.base, list_leg_ends(decomposition)
     found, rest = list[PlatformObservation](), list[Observation]()
     for each in observation_model.observations:
         reference = each.seen_from or observation_model.reference
         ends = {reference, each.link}
         body = next(iter(ends - {base}), base)
-        if each.leg in (*decomposition.labels, "") and (each.by_segment or isinstance(each, Encoder)):
+        if each.leg in (*decomposition.labels, "") and (each.is_segment_direction or isinstance(each, Encoder)):
             rest.append(each)
         elif isinstance(each, CameraObservation | SeenAxis) and base in ends and body in bodies:
             loci = each.loci(each.sighting(goal.pose(reference), goal.pose(each.link)))
@@ -103,7 +103,11 @@ def _with_sights(confined: TipLoci, seen: Sequence[PlatformObservation], goal: C
     """Return a platform with its observations. Raises ``UnsupportedLocus`` if these are not points on loci in the base:
     cameras on the platform beside legs that restrict it, angles in a plane."""
     turning = confined.motion in ("spatial", "oriented")
-    sides = {each.back for each in seen if not _symmetric(each)} if turning or confined.motion == "planar" else set()
+    sides = (
+        {each.back for each in seen if not _is_symmetric_kind(each)}
+        if turning or confined.motion == "planar"
+        else set()
+    )
     back = sides == {True}
     if len(sides) > 1 or (back and (confined.tips or confined.angles)):
         raise UnsupportedLocus(
@@ -147,13 +151,13 @@ def all_loci(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[TipLoc
 def _unheld(measured: MeasuredRobot, goal: ClosedConfiguration) -> TipLoci:
     """Return a platform without a leg. Raises ``UnsupportedLocus`` if legs restrict its motion."""
     decomposition, dof = measured.setup.decomposition, measured.setup.dof
-    bodies, (motion, normal) = leg_ends(decomposition), measured.moving
+    bodies, (motion, normal) = list_leg_ends(decomposition), measured.moving
     if len(bodies) > 1 or dof != {"translations": dof, "planar": 3, "spatial": 6}[motion]:
         raise UnsupportedLocus(decomposition.mechanism.name, "its legs restrict how the platform moves")
     return TipLoci(goal, motion, (), bodies, normal)
 
 
-def _symmetric(sight: PlatformObservation) -> bool:
+def _is_symmetric_kind(sight: PlatformObservation) -> bool:
     """Return True if it is the same condition on the camera relative to the point: a distance, a position, angles."""
     return all(each.turns or len(each.normals) in (0, 3) for each in sight.loci)
 
@@ -173,7 +177,7 @@ def _reach(locus: FixedValueLocus, plane: Array | None) -> Reach | None:
         return Circle(centre, plane, float(np.linalg.norm(locus.place - centre)))
     flat = locus.normals - np.outer(locus.normals @ plane, plane)
     _, sizes, rows = np.linalg.svd(flat)
-    rank = int(np.sum(sizes > EXACT))
+    rank = int(np.sum(sizes > EXACT_INCIDENCE_TOL))
     return None if not rank else Line(locus.place, np.cross(plane, rows[0])) if rank == 1 else Point(locus.place)
 
 
@@ -208,16 +212,16 @@ Poses = Callable[[str], Array]
 
 def opposite(seen: Sequence[Observation], goal: ClosedConfiguration, reference: str, pose: Poses) -> tuple[str, ...]:
     """Return the observations whose value at a pose of the links is the opposite of the goal's."""
-    return tuple(each.leg for each in seen if not _same_value(each, each.seen_from or reference, goal, pose))
+    return tuple(each.leg for each in seen if not _has_goal_value(each, each.seen_from or reference, goal, pose))
 
 
-def _same_value(seen: Observation, reference: str, goal: ClosedConfiguration, pose: Poses) -> bool:
+def _has_goal_value(seen: Observation, reference: str, goal: ClosedConfiguration, pose: Poses) -> bool:
     try:
         there = seen.value(pose(reference), pose(seen.link))
     except UndefinedValue:
         return False
     off = seen.difference(there, seen.value(goal.pose(reference), goal.pose(seen.link)))
-    return bool(np.all(np.abs(off / goal.model.length ** np.asarray(seen.dimension)) <= SAME_SENSE))
+    return bool(np.all(np.abs(off / goal.model.length ** np.asarray(seen.dimension)) <= MEASURED_VALUE_TOL))
 
 
 def behind(observed: Sequence[Observation], pose: Poses) -> tuple[str, ...] | None:
@@ -230,5 +234,5 @@ def behind(observed: Sequence[Observation], pose: Poses) -> tuple[str, ...] | No
         o.leg
         for o in points
         if o.camera is not None
-        and transform(inverse(pose(o.camera.link) @ o.camera.pose), transform(pose(o.link), o.at))[2] <= 0.0
+        and transform(invert_pose(pose(o.camera.link) @ o.camera.pose), transform(pose(o.link), o.at))[2] <= 0.0
     )

@@ -14,12 +14,21 @@ import numpy as np
 
 from ...errors import GeometryAmbiguous
 from ...geometry.vectors import Array
-from ...tolerances import LOCUS, MEANT, NEAR_MODE, NO_NEAR_MODE, RANK_GAP, SAME_NEAR_MODE, TIP_ROUNDING, VANISHES
+from ...tolerances import (
+    LOCUS_DISTANCE_TOL,
+    LOCUS_EXTENT_TOL,
+    NEAR_MODE_DIFFERENCE_TOL,
+    NEAR_MODE_DISTANCE_MAX,
+    NEAR_MODE_START_MISS_MAX,
+    RANK_GAP_MIN,
+    SNAP_DISTANCE_MAX,
+    TIP_ROUNDING,
+)
 from .constrained_platform import System
 from .loci import Sphere, length
 from .quadrics import UNIT, Conic, conditions
 from .rigid import Spatial
-from .roots import PRECISION
+from .roots import ROOT_ISOLATION_BITS_COUNT
 
 
 def tip_rounding(system: System, at: Array) -> float:
@@ -33,7 +42,7 @@ def off(system: System, k: int, at: Array, shift: float, turn: float) -> float:
     return shift + turn * length(system.tips[k]) + tip_rounding(system, at)
 
 
-def meets(system: System, q: Array, goal: Array, shift: float, turn: float) -> bool:
+def may_be_goal(system: System, q: Array, goal: Array, shift: float, turn: float) -> bool:
     """Return True if the exact pose about ``q`` can be that about ``goal``: all its tips can."""
     return all(
         length(one - other) <= off(system, k, one, shift, turn) + tip_rounding(system, other)
@@ -49,7 +58,7 @@ def is_excluded(system: System, q: Array, shift: float, turn: float) -> bool:
     at, frame = system.tips_at(q), system.frame
     numbers = system.balls(frame)
     misses = np.linalg.norm(system.off(at), axis=1)
-    with ctx.workprec(PRECISION):
+    with ctx.workprec(ROOT_ISOLATION_BITS_COUNT):
         for k in np.argsort(-misses).tolist():
             radius = off(system, k, at[k], shift, turn)
             if misses[k] <= radius:
@@ -61,14 +70,14 @@ def is_excluded(system: System, q: Array, shift: float, turn: float) -> bool:
     return False
 
 
-def torn(system: System, places: Mapping[int, tuple[Array, float]]) -> bool:
+def is_beyond_rigid_platform(system: System, places: Mapping[int, tuple[Array, float]]) -> bool:
     """Return True if tips of a rigid platform, at ``places`` (3,) known to a distance (m), are farther from or nearer
     to each other than they are on it: no pose brings them there."""
     from flint import ctx
 
     frame = system.frame
     numbers = system.balls(frame)
-    with ctx.workprec(PRECISION):
+    with ctx.workprec(ROOT_ISOLATION_BITS_COUNT):
         tips = {
             k: (
                 numbers.vector(frame.point(at), (miss + tip_rounding(system, at)) / frame.size * UNIT),
@@ -95,7 +104,7 @@ def words(goal: bool, lost: bool, fitting: Sequence[float], out: int, open_: int
     return ", ".join(parts)
 
 
-STARTS = 40
+CONTINUOUS_FAMILY_STARTS_COUNT = 40
 """Number of random poses from which a pose of a continuous family is sought."""
 
 
@@ -109,11 +118,13 @@ def stationary(system: System, starts: Sequence[Array], known: Sequence[Array]) 
     found: list[tuple[float, Array]] = []
     seen = [np.asarray(q) for q in known]
     for start in starts:
-        if residual(system, start) > NO_NEAR_MODE:
+        if residual(system, start) > NEAR_MODE_START_MISS_MAX:
             continue
         q = _least_misses(system, start)
         miss = residual(system, q)
-        if miss <= NEAR_MODE and all(_apart(system, q, other) > SAME_NEAR_MODE for other in seen):
+        if miss <= NEAR_MODE_DISTANCE_MAX and all(
+            _apart(system, q, other) > NEAR_MODE_DIFFERENCE_TOL for other in seen
+        ):
             found.append((miss, q))
             seen.append(q)
     return [q for _, q in sorted(found, key=lambda each: each[0])]
@@ -123,11 +134,11 @@ def dimension(system: System) -> int | None:
     """Return the largest dimension of the real poses about one that closes; None if none is found."""
     rng = np.random.default_rng(0)
     found = []
-    for _ in range(STARTS):
+    for _ in range(CONTINUOUS_FAMILY_STARTS_COUNT):
         q = _least_misses(system, system.somewhere(rng))
-        if residual(system, q) <= VANISHES:
+        if residual(system, q) <= LOCUS_DISTANCE_TOL:
             values = np.linalg.svd(_slopes(system, q), compute_uv=False)
-            found.append(int(len(q) - np.sum(values > np.sqrt(LOCUS) * values[0])))
+            found.append(int(len(q) - np.sum(values > np.sqrt(LOCUS_EXTENT_TOL) * values[0])))
     return max(found, default=None)
 
 
@@ -178,12 +189,12 @@ def snap_centres(system: System) -> tuple[System, tuple[SnappedPoints, ...]]:
         for where, at in points.items()
         for i, j in combinations(at, 2)
     ]
-    accepted = [each for each in apart if each[0] <= MEANT * system.size]
+    accepted = [each for each in apart if each[0] <= SNAP_DISTANCE_MAX * system.size]
     largest = max((each[0] for each in accepted), default=0.0)
     smallest = min((each[0] for each in apart if each not in accepted), default=np.inf)
-    if largest * RANK_GAP > smallest:
+    if largest * RANK_GAP_MIN > smallest:
         raise GeometryAmbiguous(
-            "joint centres that may coincide", largest / system.size, smallest / system.size, RANK_GAP
+            "joint centres that may coincide", largest / system.size, smallest / system.size, RANK_GAP_MIN
         )
     if largest == 0.0:
         return system, ()

@@ -15,17 +15,17 @@ from typing import Any
 
 import numpy as np
 
-from ...geometry.vectors import Array, plane_axes, pose, rotation_about
+from ...geometry.vectors import Array, build_plane_axes, build_pose, rotate_about_axis
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.tasks import solve as close
-from ...tolerances import NUMBER_ROUNDING, SOLVED
+from ...tolerances import CLOSURE_SOLVER_TOL, NUMBER_ROUNDING
 from .constrained_platform import System
 from .modular_root_bound import Residues, bezout, partitions
 
 Exponents = tuple[int, ...]
 Sum = dict[tuple[int, Exponents], complex]
 """Coefficients by the number of a slide (-1: none) and the exponents of u, negative ones of v."""
-MOST_GROUPED = 6
+ALL_GROUPINGS_UNKNOWNS_MAX = 6
 """Unknowns up to which all ways to group them are tried."""
 
 
@@ -160,7 +160,7 @@ class PlanarLoops(System):
     @cached_property
     def frame(self) -> Array:  # type: ignore[override]
         """Two unit vectors of the plane; shape (2, 3)."""
-        return plane_axes(self.normal)
+        return build_plane_axes(self.normal)
 
     @cached_property
     def forms(self) -> list[dict[Exponents, complex]]:
@@ -191,7 +191,7 @@ class PlanarLoops(System):
         )
         start, angle = self.goal.pose(link), float(np.array(self.turns[link]) @ psi)
         moved = self.size * (np.real(shift) * self.frame[0] + np.imag(shift) * self.frame[1])
-        return pose(start[:3, 3] + moved, rotation_about(self.normal, angle) @ start[:3, :3])
+        return build_pose(start[:3, 3] + moved, rotate_about_axis(self.normal, angle) @ start[:3, :3])
 
     def body_poses(self, q: Array) -> dict[str, Array]:
         """Return the poses (4, 4) of the bodies that determine the platform."""
@@ -202,7 +202,7 @@ class PlanarLoops(System):
         model, step = self.goal.model, np.zeros(self.goal.model.nv)
         for joint in model.mechanism.joints.values():
             (place,) = model.coordinates[joint.name]
-            if joint.type.slides:
+            if joint.type.has_translation:
                 k, factor = self.moves[joint.name]
                 step[place] = 0.0 if k < 0 else factor * q[self.angles + k]
             else:
@@ -213,7 +213,9 @@ class PlanarLoops(System):
                     @ joint.axis
                 )
                 step[place] = float(E @ q[: self.angles]) * np.sign(axis @ self.normal)
-        return ClosedConfiguration.of(model, close(model, model.integrate(self.goal.q, step), tolerance=SOLVED)[0])
+        return ClosedConfiguration.of(
+            model, close(model, model.integrate(self.goal.q, step), tolerance=CLOSURE_SOLVER_TOL)[0]
+        )
 
     def pose_terms(self, x: Sequence[Any]) -> list[Any]:
         """Return the components of the bodies' pose, each with its conjugate, at balls (cos ψ, sin ψ, t)."""
@@ -273,7 +275,7 @@ def groupings(angles: int, slides: int, loops: Sequence[frozenset[int]]) -> Iter
         yield [group for part in own for group in part if group]
         yield [group for x, y, z in own for group in (x + y, z) if group]
         yield [x + y + z for x, y, z in own]
-    yield from partitions([*range(n)]) if n <= MOST_GROUPED else ()
+    yield from partitions([*range(n)]) if n <= ALL_GROUPINGS_UNKNOWNS_MAX else ()
 
 
 def unknowns(terms: Iterable[tuple[int, Exponents]], angles: int) -> frozenset[int]:

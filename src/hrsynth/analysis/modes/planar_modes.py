@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from ...budgets import LARGEST_LOOPS, LOOP_SYSTEMS, PLANAR_STARTS
-from ...errors import SystemNotSolved
-from ...geometry.vectors import Array, frozen
+from ...errors import ExternalSolverFailure
+from ...geometry.vectors import Array, freeze_array
 from ...kinematics.configuration import ClosedConfiguration
 from ..measured import MeasuredRobot
 from .branches import Model
@@ -59,14 +59,14 @@ def proposals(forms: Sequence[dict[Exponents, complex]], angles: int, enough: in
 
 
 def solve_loops(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0) -> tuple[Model, SystemModes]:
-    """All modes, with the goal known to ``error`` (m). Raises ``UnsupportedLocus``, and ``SystemNotSolved`` where not
-    all closings are enclosed that there may be."""
-    refused = list[SystemNotSolved]()
+    """All modes, with the goal known to ``error`` (m). Raises ``UnsupportedLocus``, and ``ExternalSolverFailure`` where
+    not all closings are enclosed that there may be."""
+    refused = list[ExternalSolverFailure]()
     for system in islice(systems(measured, goal), LOOP_SYSTEMS):
         system = replace(system, error=system.error + error)
         try:
             found = _judge(system)
-        except SystemNotSolved as unsolved:
+        except ExternalSolverFailure as unsolved:
             refused.append(unsolved)
         else:
             # without couplings not all loops need be among those
@@ -84,21 +84,21 @@ def _judge(system: PlanarLoops) -> SystemModes:
     size = f"{loops}, {angles} and {slides}"
     most, why, bound = system.most, "degrees in groups of unknowns (Bézout)", "class"
     if most > LARGEST_LOOPS:
-        raise SystemNotSolved("the loops", f"{size}: up to {most} solutions, too many (at most {LARGEST_LOOPS})")
+        raise ExternalSolverFailure("the loops", f"{size}: up to {most} solutions, too many (at most {LARGEST_LOOPS})")
     boxes, lost = _enclose(system, proposals(system.forms, system.angles, most))
     if len(boxes) < most and (fewer := system.residues.most_by_ranks(len(boxes))) is not None and fewer < most:
         most, why, bound = fewer, "ranks modulo a prime of 62 bits", "rank"
     start = np.array([1.0] * system.angles + [0.0] * (system.angles + system.slides))
-    at_goal = [box for box in boxes if box.real and box.holds(start)]
+    at_goal = [box for box in boxes if box.real and box.has_pose(start)]
     if len(boxes) < most or lost or len(at_goal) != 1:
-        raise SystemNotSolved("the loops", f"{size}: of {most} solutions at most ({why}) {len(boxes)} have boxes")
+        raise ExternalSolverFailure("the loops", f"{size}: of {most} solutions at most ({why}) {len(boxes)} have boxes")
     seen = [system.pose_terms(_balls(box)) for box in boxes]
     if any(
         all((a - b).contains(0) for a, b in zip(one, other, strict=True))
         for k, one in enumerate(seen)
         for other in seen[:k]
     ):
-        raise SystemNotSolved("the loops", f"{size}: several of {most} solutions have one pose of the platform")
+        raise ExternalSolverFailure("the loops", f"{size}: several of {most} solutions have one pose of the platform")
     real = [box for box in boxes if box.real]
     proof = (
         f"{size}: at most {most} solutions by {why}, {len(boxes)} enclosed, all distinct, complex ones "
@@ -163,8 +163,8 @@ def _mode(system: PlanarLoops, box: PoseBox, proved: bool) -> SystemMode:
         shift,
         turn,
         residual,
-        frozen(system.pose_of(system.bodies[0], q)),
-        frozen(q),
+        freeze_array(system.pose_of(system.bodies[0], q)),
+        freeze_array(q),
         proved=proved,
         match_residual=not proved,
     )

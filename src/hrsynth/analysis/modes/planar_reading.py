@@ -11,14 +11,14 @@ from itertools import combinations, permutations
 import numpy as np
 
 from ...budgets import LARGEST_GEAR
-from ...constraints.pattern import placing_links
+from ...constraints.pattern import list_placing_links
 from ...errors import UnsupportedLocus
-from ...geometry.vectors import Array, cross, plane_axes, transform
+from ...geometry.vectors import Array, build_plane_axes, cross, transform
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism import Joint, JointType, Observation, graphs
 from ...mechanism.observations.direction import Direction
 from ...mechanism.observations.encoder import Encoder
-from ...tolerances import SAME_DIRECTION, SAME_GEOMETRY, SAME_POINT
+from ...tolerances import DIRECTION_SINE_TOL, GEOMETRY_DIFFERENCE_TOL, POINT_DISTANCE_TOL
 from ..measured import MeasuredRobot
 from .planar_loops import Exponents, PlanarLoop, PlanarLoops, Sum
 
@@ -37,7 +37,7 @@ def systems(measured: MeasuredRobot, goal: ClosedConfiguration) -> Iterator[Plan
     seen, reason, tight, looser = measured.observation_model.observations, "", False, list[PlanarLoops]()
     for size in range(len(seen), 0, -1):
         for chosen in combinations(seen, size):
-            reading = _Reading(measured, goal, chosen)
+            reading = _PlanarJoints(measured, goal, chosen)
             found = reading.system([each for each in seen if each not in chosen])
             if isinstance(found, str):
                 reason = reason or found
@@ -53,14 +53,14 @@ def systems(measured: MeasuredRobot, goal: ClosedConfiguration) -> Iterator[Plan
         raise UnsupportedLocus(goal.model.mechanism.name, reason)
 
 
-class _Reading:
+class _PlanarJoints:
     """A mechanism's joints, in its plane."""
 
     def __init__(self, measured: MeasuredRobot, goal: ClosedConfiguration, seen: Sequence[Observation]) -> None:
         decomposition = measured.setup.decomposition
         self.mechanism, self.goal, self.seen = goal.model.mechanism, goal, seen
         self.reference = measured.observation_model.reference
-        self.bodies, self.point = placing_links(decomposition), decomposition.point
+        self.bodies, self.point = list_placing_links(decomposition), decomposition.point
         self.joints = list(self.mechanism.joints.values())
         self.axes = {
             joint.name: self._displacement(joint.predecessor)[:3, :3] @ joint.axis
@@ -70,9 +70,9 @@ class _Reading:
         self.normal = next((self.axes[joint.name] for joint in self.joints if joint.type is KINDS[0]), np.zeros(3))
         for joint in self.joints:
             along = abs(float(self.axes.get(joint.name, np.zeros(3)) @ self.normal))
-            if joint.type not in KINDS or abs(along - (not joint.type.slides)) > SAME_DIRECTION:
+            if joint.type not in KINDS or abs(along - (not joint.type.has_translation)) > DIRECTION_SINE_TOL:
                 raise self._refuse(f"joint {joint.name} is not one of a planar mechanism")
-        self.frame = plane_axes(self.normal) / goal.model.length
+        self.frame = build_plane_axes(self.normal) / goal.model.length
         self.middle = np.mean([self._centre(joint) for joint in self.joints], axis=0)
         self.places = {link: i for i, link in enumerate(self.mechanism.links)}
         self.dropped = 0.0
@@ -165,13 +165,13 @@ class _Reading:
     def _turns(self) -> dict[str, Exponents]:
         """E: all turns that slides, gears, and what is measured of turns allow."""
         rows = [self._row({self.mechanism.base: 1})]
-        geared = [joint for _, _, *both in self._gears() for joint in both if not joint.type.slides]
+        geared = [joint for _, _, *both in self._gears() for joint in both if not joint.type.has_translation]
         for name, ratio, one, other in self._gears():
-            if one.type.slides is not other.type.slides:
+            if one.type.has_translation is not other.type.has_translation:
                 raise self._refuse(f"coupling {name} joins a rotation and a translation")
-            if not one.type.slides:
+            if not one.type.has_translation:
                 q = Fraction(ratio).limit_denominator(LARGEST_GEAR)
-                if abs(float(q) - ratio) > SAME_GEOMETRY or abs(q) > LARGEST_GEAR:
+                if abs(float(q) - ratio) > GEOMETRY_DIFFERENCE_TOL or abs(q) > LARGEST_GEAR:
                     raise self._refuse(
                         f"coupling {name}: {ratio:g} is not a quotient of whole numbers up to {LARGEST_GEAR}"
                     )
@@ -183,14 +183,14 @@ class _Reading:
                 rows.append(self._row(row))
         rows += [self._row({one: 1, other: -1}) for one, other in self._held_pairs(self.seen, [j.name for j in geared])]
         if len(
-            graphs.spanning_forest(
+            graphs.build_spanning_forest(
                 self.mechanism.links, list({j.name: j for j in geared}.values()), [0.0] * len(geared)
             )
         ) < len({joint.name for joint in geared}):
             raise self._refuse("its couplings form a cycle")
         tied = whole_kernel(rows)
         assert tied is not None
-        equal = [*(joint.links for joint in self.joints if joint.type.slides), *self._held_pairs(self.seen)]
+        equal = [*(joint.links for joint in self.joints if joint.type.has_translation), *self._held_pairs(self.seen)]
         places = [[each[i] for each in tied] for i in range(len(self.places))]
         rest = whole_kernel(
             [[a - b for a, b in zip(*(places[self.places[link]] for link in links), strict=True)] for links in equal]
@@ -214,11 +214,13 @@ class _Reading:
         for each in seen:
             if isinstance(each, Direction):
                 direction = self.goal.pose(each.link)[:3, :3] @ each.direction
-                if joints is None and float(np.linalg.norm(cross(direction, self.normal))) > SAME_DIRECTION:
+                if joints is None and float(np.linalg.norm(cross(direction, self.normal))) > DIRECTION_SINE_TOL:
                     yield each.link, each.seen_from or self.reference
             elif not isinstance(each, Encoder) or each.joint not in self.mechanism.joints:
                 raise self._refuse(f"{each.kind} {each.leg} is neither a direction nor a joint's coordinate")
-            elif not self.mechanism.joints[each.joint].type.slides and (joints is None or each.joint in joints):
+            elif not self.mechanism.joints[each.joint].type.has_translation and (
+                joints is None or each.joint in joints
+            ):
                 yield self.mechanism.joints[each.joint].links
 
     def _gears(self) -> Iterator[tuple[str, float, Joint, Joint]]:
@@ -229,10 +231,10 @@ class _Reading:
 
     def _moves(self) -> dict[str, tuple[int, float]]:
         """Return the number of each P's slide, -1 where it is fixed, and how many times its length the P moves."""
-        sliding = [joint.name for joint in self.joints if joint.type.slides]
+        sliding = [joint.name for joint in self.joints if joint.type.has_translation]
         roots = {name: (name, 1.0) for name in sliding}
         for name, ratio, one, other in self._gears():
-            if one.type.slides:
+            if one.type.has_translation:
                 (a, f), (b, g) = roots[one.name], roots[other.name]  # g b = ratio f a
                 if a == b:
                     raise self._refuse(f"coupling {name} joins coupled joints")
@@ -250,9 +252,9 @@ class _Reading:
     ) -> tuple[dict[str, Sum], list[Sum]]:
         """Return the shift of each link's frame, and the closure equations of each joint besides a spanning tree."""
         still = (-1, (0,) * len(turns[self.mechanism.base]))
-        tree = graphs.spanning_forest(self.mechanism.links, self.joints, [0.0] * len(self.joints))
+        tree = graphs.build_spanning_forest(self.mechanism.links, self.joints, [0.0] * len(self.joints))
         origins: dict[str, Sum] = {self.mechanism.base: {}}
-        for joint, near, far in graphs.outward(self.mechanism.base, tree):
+        for joint, near, far in graphs.order_outward(self.mechanism.base, tree):
             step = self._step(joint, turns, moves)
             origins[far] = self._sum(origins[near], step, 1 if near == joint.predecessor else -1)
         loops = [
@@ -287,7 +289,7 @@ class _Reading:
 
     def _step(self, joint: Joint, turns: dict[str, Exponents], moves: dict[str, tuple[int, float]]) -> Sum:
         """Return the difference of the successor's and the predecessor's origin shift."""
-        if joint.type.slides:
+        if joint.type.has_translation:
             k, factor = moves[joint.name]
             along = factor * complex(*(self.frame @ self.axes[joint.name] * self.goal.model.length))
             return {} if k < 0 else {(k, turns[joint.predecessor]): along}
@@ -299,8 +301,8 @@ class _Reading:
         total = dict(one)
         for key, a in other.items():
             total[key] = total.get(key, 0j) + factor * a
-        self.dropped = max([self.dropped, *(abs(a) for a in total.values() if abs(a) < SAME_POINT)])
-        return {key: a for key, a in total.items() if abs(a) >= SAME_POINT}
+        self.dropped = max([self.dropped, *(abs(a) for a in total.values() if abs(a) < POINT_DISTANCE_TOL)])
+        return {key: a for key, a in total.items() if abs(a) >= POINT_DISTANCE_TOL}
 
 
 def _turn_loop(loop: Sum) -> Sum:

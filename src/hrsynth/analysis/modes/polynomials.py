@@ -25,7 +25,7 @@ from ...budgets import FINEST_BOX
 if TYPE_CHECKING:
     from flint import fmpz, fmpz_poly
 
-ATTEMPTS = 3
+ENCLOSURE_ATTEMPTS_MAX = 3
 """Boxes that are tried, each wider than the one before if that one was too narrow."""
 
 
@@ -97,7 +97,7 @@ def krawczyk(equations: Sequence[Polynomial], start: Sequence[Any]) -> list[Any]
     step = Y @ np.array([equation.value(middle) for equation in equations], dtype=object)
     least = [FINEST_BOX * (1.0 + float(abs(m))) for m in middle]
     radii = [4.0 * float(s.abs_upper()) + tiny for s, tiny in zip(step, least, strict=True)]
-    for _ in range(ATTEMPTS):
+    for _ in range(ENCLOSURE_ATTEMPTS_MAX):
         offsets = np.array([arb(0, r) if real else acb(arb(0, r), arb(0, r)) for r in radii], dtype=object)
         slopes = np.array(_jacobian(equations, [m + d for m, d in zip(middle, offsets, strict=True)]), dtype=object)
         image = -step + (np.eye(len(middle), dtype=int) - Y @ slopes) @ offsets

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from ...budgets import LARGEST_FORMS, MOST_INFINITE
+from ...budgets import LARGEST_FORMS, QUATERNION_POWERS_MAX
 from ...geometry.vectors import Array
 from .conditions import PoseCondition
 from .pose_forms import ROTATION, SquareForms, exponents
@@ -173,7 +173,7 @@ def bound(forms: SquareForms) -> tuple[int, int, int] | None:
     """D, the degree t and k; None where there are infinitely many, or the forms would be too many."""
     t = forms.degree
     while forms.others and len(exponents(forms.shape, t)) <= LARGEST_FORMS:
-        most = min(MOST_INFINITE, t // 2 - 1)
+        most = min(QUATERNION_POWERS_MAX, t // 2 - 1)
         found = dimensions(forms, t, most)
         for k, (one, next_) in enumerate(pairwise(found), 1):
             if one == next_:

@@ -14,17 +14,17 @@ from typing import Any
 import numpy as np
 
 from ...geometry.vectors import Array
-from ...tolerances import BOXES_APART, NEARLY_REAL_POSE, NUMBER_ROUNDING
+from ...tolerances import BOX_SEPARATION_TOL, NEARLY_REAL_POSE_TOL, NUMBER_ROUNDING
 from .conditions import PoseCondition
 from .polynomials import Polynomial, krawczyk
 from .pose_forms import ROTATION, Poses, SquareForms
 
-PRECISION = 128
+POSE_BOX_BITS_COUNT = 128
 """Bits of the enclosures."""
-FAR_FROM_REAL = 1.0
+COMPLEX_ZERO_IMAGINARY_MIN = 1.0
 """Imaginary part of a coordinate, or of an angle, from which on a zero is not taken for a real one with other last
 digits."""
-NEWTON = 4
+PROPOSAL_NEWTON_STEPS_COUNT = 4
 """Steps that make a proposal as good as floats allow."""
 
 
@@ -134,11 +134,11 @@ class PoseBox:
         x = self.middle.real
         return poses.turns @ x[: self.turned], poses.moves @ x[self.turned :]
 
-    def holds(self, x: Array) -> bool:
+    def has_pose(self, x: Array) -> bool:
         """Return True if a pose is in it."""
         return bool(np.any(np.all(np.abs(self.alike(x) - self.middle) <= self.radii, axis=1)))
 
-    def apart(self, others: Sequence[PoseBox]) -> bool:
+    def is_disjoint_from(self, others: Sequence[PoseBox]) -> bool:
         """Return True if no pose is in this one and in one of the others."""
         if not others:
             return True
@@ -153,7 +153,7 @@ def refine_poses(forms: SquareForms, y: Array, p: Array) -> Array:
     E, moves = poses.turns, poses.moves
     M = [[np.einsum("ikab,k,ac,bd->icd", ROTATION, v, E, E) for v in (c.b, c.c)] for c in conditions]
     x, turned = np.hstack([y, p @ moves]), E.shape[1]
-    for _ in range(NEWTON):
+    for _ in range(PROPOSAL_NEWTON_STEPS_COUNT):
         y, p = x[:, :turned], x[:, turned:] @ moves.T
         F, J = [np.sum(y * y, axis=1) - 1.0], [np.hstack([2.0 * y, 0.0 * x[:, turned:]])]
         for c, (b, a) in zip(conditions, M, strict=True):
@@ -192,25 +192,25 @@ def enclose_poses(
     )
     found: list[PoseBox] = []
     lost = 0
-    with ctx.workprec(PRECISION):
+    with ctx.workprec(POSE_BOX_BITS_COUNT):
         for number, x in enumerate(refine_poses(forms, *proposed)):
             if lost and len(found) + len(proposed[0]) - number < needed:
                 break
-            real = bool(np.abs(x.imag).max() < NEARLY_REAL_POSE)
+            real = bool(np.abs(x.imag).max() < NEARLY_REAL_POSE_TOL)
             model = None if real else at_middle([box for box in found if not box.real], x.conj())
             if model is not None:
                 each: PoseBox | None = replace(model, middle=model.middle.conj())
             elif np.all(np.isfinite(x)):
                 start = [arb(v) for v in x.real.tolist()] if real else [acb(v.real, v.imag) for v in x.tolist()]
                 each = as_box(krawczyk(equations, start), real, turned)
-                if each is None and turned == 4 and np.abs(x.imag).max() > FAR_FROM_REAL:
+                if each is None and turned == 4 and np.abs(x.imag).max() > COMPLEX_ZERO_IMAGINARY_MIN:
                     each = as_box(krawczyk(exact, start), False, turned)
                     each = None if each is None else replace(each, rounded=True)
             else:
                 each = None
             if each is None:
                 lost += 1
-            elif each.apart(found):
+            elif each.is_disjoint_from(found):
                 found.append(each)
     return found, lost
 
@@ -220,7 +220,7 @@ def at_middle(boxes: Sequence[PoseBox], x: Array) -> PoseBox | None:
     if not boxes:
         return None
     same = np.abs(np.array([box.middle for box in boxes]) - boxes[0].alike(x)[:, None]) <= (
-        NEARLY_REAL_POSE * (1.0 + np.abs(x))
+        NEARLY_REAL_POSE_TOL * (1.0 + np.abs(x))
     )
     found = np.nonzero(np.any(np.all(same, axis=2), axis=0))[0]
     return boxes[found[0]] if len(found) else None
@@ -237,14 +237,14 @@ def zeros(equations: Sequence[Polynomial], proposed: Iterable[Array]) -> tuple[l
     from flint import acb, arb, ctx
 
     found, lost = list[PoseBox](), 0
-    with ctx.workprec(PRECISION):
+    with ctx.workprec(POSE_BOX_BITS_COUNT):
         for x in proposed:
-            real = bool(np.abs(x.imag).max(initial=0.0) < NEARLY_REAL_POSE * (1.0 + np.abs(x).max(initial=0.0)))
+            real = bool(np.abs(x.imag).max(initial=0.0) < NEARLY_REAL_POSE_TOL * (1.0 + np.abs(x).max(initial=0.0)))
             start = [arb(v) for v in x.real.tolist()] if real else [acb(v.real, v.imag) for v in x.tolist()]
             box = as_box(krawczyk(equations, start), real, 0)
             if box is None:
                 lost += 1
-            elif box.apart(found):
+            elif box.is_disjoint_from(found):
                 found.append(box)
     return found, lost
 
@@ -255,15 +255,15 @@ def as_box(box: Sequence[Any] | None, real: bool, turned: int) -> PoseBox | None
         return None
     middle = np.array([complex(v.mid()) for v in box])
     radii = np.array([float(v.rad()) if real else float(v.real.rad()) + float(v.imag.rad()) for v in box])
-    radii = radii * (1.0 + BOXES_APART) + BOXES_APART * np.abs(middle)
+    radii = radii * (1.0 + BOX_SEPARATION_TOL) + BOX_SEPARATION_TOL * np.abs(middle)
     if not real and np.all(np.abs(middle.imag) <= radii):
         return None
     return PoseBox(middle, radii, real, tuple(box), turned)
 
 
-def excluded_by(conditions: Sequence[PoseCondition], poses: Poses, box: PoseBox, slack: float) -> bool:
+def is_box_excluded(conditions: Sequence[PoseCondition], poses: Poses, box: PoseBox, slack: float) -> bool:
     """Return True if one of the conditions is met nowhere in a box, for all input within the slack."""
     from flint import ctx
 
-    with ctx.workprec(PRECISION):
+    with ctx.workprec(POSE_BOX_BITS_COUNT):
         return any(not Zero(c, poses, slack).value(box.box).contains(0) for c in conditions)

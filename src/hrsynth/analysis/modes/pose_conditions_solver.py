@@ -12,13 +12,13 @@ from math import prod
 
 import numpy as np
 
-from ...budgets import BRANCH_CHOICES, EFFORT, FEW_FORMS_SECONDS, FORMS_SECONDS, LARGEST_FORMS
-from ...constraints.pattern import leg_ends
-from ...errors import SystemNotSolved, UnsupportedLocus
-from ...geometry.so3 import exponential, logarithm, rotation_of
-from ...geometry.vectors import Array, frozen, inverse, pose
+from ...budgets import FEW_FORMS_SECONDS, FORMS_SECONDS, LARGEST_FORMS, LEG_SOLUTION_CHOICES_MAX, MODES_TIME_LIMIT_S
+from ...constraints.pattern import list_leg_ends
+from ...errors import ExternalSolverFailure, UnsupportedLocus
+from ...geometry.so3 import convert_from_quaternion, convert_rotations_to_vectors, convert_vectors_to_rotations
+from ...geometry.vectors import Array, build_pose, freeze_array, invert_pose
 from ...kinematics.configuration import ClosedConfiguration
-from ...tolerances import MOVED, RANK_GAP, SAME_POINT, SAME_RELATION, VANISHES
+from ...tolerances import LOCUS_DISTANCE_TOL, MOVED_AXIS_LEVER_MAX, POINT_DISTANCE_TOL, RANK_GAP_MIN, RELATION_ANGLE_TOL
 from ..measured import MeasuredRobot
 from .branches import Model, together
 from .conditions import OnPlane, PoseCondition
@@ -27,7 +27,7 @@ from .leg_conditions import Branches, OriginAndUnit, leg_conditions, rigid_platf
 from .observation_loci import PlatformObservation, conditions, sights
 from .overdetermined import words
 from .pose_bound import bound
-from .pose_boxes import PoseBox, enclose_poses, excluded_by, told_far
+from .pose_boxes import PoseBox, enclose_poses, is_box_excluded, told_far
 from .pose_forms import Poses, SquareForms, proposals
 from .solve import SystemMode, SystemModes
 
@@ -60,17 +60,19 @@ class PosedPlatform(System):
 
     def pose(self, q: Array) -> Array:
         """The platform's frame in the base frame; shape (4, 4)."""
-        return pose(q[:3], exponential(q[3:]))
+        return build_pose(q[:3], convert_vectors_to_rotations(q[3:]))
 
     def place(self, box: PoseBox) -> Array:
         """q at the middle of a real box."""
         turn, p = box.pose(self.poses)
-        return np.array([*(self.middle.origin + self.size * p), *logarithm(rotation_of(turn))])
+        return np.array(
+            [*(self.middle.origin + self.size * p), *convert_rotations_to_vectors(convert_from_quaternion(turn))]
+        )
 
     def miss(self, box: PoseBox) -> float:
         """The largest distance from a condition (sizes) at the middle of a real box."""
         turn, p = box.pose(self.poses)
-        R, found = rotation_of(turn), [0.0]
+        R, found = convert_from_quaternion(turn), [0.0]
         for c in self.conditions:
             point, arrow = p + R @ c.b, R @ c.c
             slope = np.hstack(c.slopes(point, arrow, np.asarray))
@@ -89,17 +91,18 @@ def pose_platform(measured: MeasuredRobot, goal: ClosedConfiguration) -> list[Po
         leg_conditions(decomposition, leg, rest, goal, middle, normal, motion == "translations")
         for leg in decomposition.legs
     ]
-    moved = MOVED * sum(each for _, each in found)
+    moved = MOVED_AXIS_LEVER_MAX * sum(each for _, each in found)
     held = any(branch for branches, _ in found for branch in branches)
     ways = [(turned, conditions(seen, middle, turned)) for turned in ((False,) if held else (False, True))]
     turned, own = min(ways, key=lambda way: sum(c.degree for c in way[1]))
     counts = {leg.label: len(branches) for leg, (branches, _) in zip(decomposition.legs, found, strict=True)}
     found.append(([own], 0.0))
     legs: list[Branches] = [branches for branches, _ in found]
-    if prod(map(len, legs)) > BRANCH_CHOICES:
+    if prod(map(len, legs)) > LEG_SOLUTION_CHOICES_MAX:
         raise UnsupportedLocus(name, f"its legs have {prod(map(len, legs))} combinations of leg solutions")
     if any(
-        abs(float(c.value(c.b, c.c, np.asarray))) > SAME_RELATION * (1.0 + float(np.abs(getattr(c, "f", 0.0)).max()))
+        abs(float(c.value(c.b, c.c, np.asarray)))
+        > RELATION_ANGLE_TOL * (1.0 + float(np.abs(getattr(c, "f", 0.0)).max()))
         for branches in legs
         for c in branches[0]
     ):
@@ -118,7 +121,7 @@ def pose_platform(measured: MeasuredRobot, goal: ClosedConfiguration) -> list[Po
             turned,
             seen,
             counts,
-            error=moved + MOVED * goal.model.length * off,
+            error=moved + MOVED_AXIS_LEVER_MAX * goal.model.length * off,
         )
         for kept, off in asked
     ]
@@ -137,7 +140,7 @@ def _once(conditions: Sequence[PoseCondition]) -> tuple[tuple[PoseCondition, ...
             ),
             default=np.inf,
         )
-        if apart > SAME_POINT / RANK_GAP:
+        if apart > POINT_DISTANCE_TOL / RANK_GAP_MIN:
             kept.append(c)
         else:
             off = max(off, apart)
@@ -150,10 +153,10 @@ def most_posed(measured: MeasuredRobot, goal: ClosedConfiguration) -> int:
 
 
 def solve_posed(
-    measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0, time_limit: float = EFFORT
+    measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0, time_limit: float = MODES_TIME_LIMIT_S
 ) -> tuple[Model, SystemModes]:
     """All modes of all choices of branches together, with the goal known to ``error`` (m). Raises ``UnsupportedLocus``,
-    and ``SystemNotSolved`` where not all poses are enclosed that there may be, or the choices need more than
+    and ``ExternalSolverFailure`` where not all poses are enclosed that there may be, or the choices need more than
     ``time_limit`` (s)."""
     systems = [
         replace(each, error=each.error + max([error, *(sight.error(error, goal) for sight in each.seen)]))
@@ -163,19 +166,19 @@ def solve_posed(
         raise UnsupportedLocus(
             measured.setup.robot.name, "the distance to the exact closed configuration is not bounded"
         )
-    (body,) = leg_ends(measured.setup.decomposition)
+    (body,) = list_leg_ends(measured.setup.decomposition)
     first = systems[0]
-    X, back = goal.pose(body), inverse(pose(first.middle.origin))
+    X, back = goal.pose(body), invert_pose(build_pose(first.middle.origin))
     made = Model(
         first,
-        lambda q: {body: (inverse if first.back else np.asarray)(first.pose(q) @ back) @ X},
+        lambda q: {body: (invert_pose if first.back else np.asarray)(first.pose(q) @ back) @ X},
         first.home,
         first.back,
     )
     forms, found = _forms(measured, first), list[SystemModes]()
     needed = len(systems) * (FEW_FORMS_SECONDS + FORMS_SECONDS * (forms.size / LARGEST_FORMS) ** 3)
     if needed > max(time_limit, FEW_FORMS_SECONDS * (len(systems) == 1)):
-        raise SystemNotSolved(
+        raise ExternalSolverFailure(
             "conditions on the pose",
             f"{len(systems)} combinations of leg solutions, {forms.size} forms each, need "
             f"about {needed:.2g} s: too many (the time limit is {time_limit:g} s)",
@@ -183,17 +186,17 @@ def solve_posed(
     for system in systems:
         found.append(_judge(system, _forms(measured, system), system is first))
         if not found[-1].complete:
-            raise SystemNotSolved("the conditions on the pose", found[-1].proof)
+            raise ExternalSolverFailure("the conditions on the pose", found[-1].proof)
     return made, together(found, first.branches, first.size)
 
 
 def _forms(measured: MeasuredRobot, system: PosedPlatform) -> SquareForms:
-    """Return as many of its conditions as dof. Raises ``UnsupportedLocus``, ``SystemNotSolved``."""
+    """Return as many of its conditions as dof. Raises ``UnsupportedLocus``, ``ExternalSolverFailure``."""
     forms = SquareForms.of(system.conditions, system.poses)
     if forms is None:
         raise UnsupportedLocus(measured.setup.robot.name, "the conditions of its legs do not determine isolated poses")
     if forms.size > LARGEST_FORMS:
-        raise SystemNotSolved(
+        raise ExternalSolverFailure(
             "conditions on the pose",
             f"{forms.most} solutions at most, among {forms.size} forms of degree "
             f"{forms.degree}: too many (at most {LARGEST_FORMS})",
@@ -224,7 +227,7 @@ def _judge(system: PosedPlatform, forms: SquareForms, own: bool) -> SystemModes:
                 proposed, lost = proposals(forms, found[1], most, found[2]), 1
         if lost:
             boxes = [] if proposed is None else enclose_poses(forms, slack, proposed)[0]
-    at_goal = [box for box in boxes if own and box.real and box.holds(np.eye(len(box.middle))[0])]
+    at_goal = [box for box in boxes if own and box.real and box.has_pose(np.eye(len(box.middle))[0])]
     goal = at_goal[0] if len(at_goal) == 1 else None
     complete = len(boxes) == most and (goal is not None) == own
     real = [box for box in boxes if box.real]
@@ -233,8 +236,8 @@ def _judge(system: PosedPlatform, forms: SquareForms, own: bool) -> SystemModes:
         f"complex ones too{told_far(boxes)}, {len(real)} real"
     )
     left = [c for c in system.conditions if c not in forms.planes and c not in forms.others]
-    kept = [box for box in real if box is goal or not excluded_by(left, forms.poses, box, slack)]
-    fitting = [box for box in kept if not left or box is goal or system.miss(box) <= VANISHES]
+    kept = [box for box in real if box is goal or not is_box_excluded(left, forms.poses, box, slack)]
+    fitting = [box for box in kept if not left or box is goal or system.miss(box) <= LOCUS_DISTANCE_TOL]
     modes = tuple(_mode(system, box, not left or box is goal) for box in fitting)
     open_ = len(kept) - len(fitting)
     if left:
@@ -265,8 +268,8 @@ def _mode(system: PosedPlatform, box: PoseBox, proved: bool) -> SystemMode:
         shift,
         turn,
         system.miss(box),
-        frozen(system.pose(q)),
-        frozen(q),
+        freeze_array(system.pose(q)),
+        freeze_array(q),
         proved=proved,
         match_residual=not proved,
     )

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ...geometry.vectors import Array
-from ...tolerances import BALL_ZERO, BOXES_APART, FARTHEST
+from ...tolerances import BALL_ZERO, BOX_SEPARATION_TOL, SOLUTION_DISTANCE_MAX
 from .bounds import Bound
 from .constrained_platform import System
 from .homotopy import ends
@@ -25,12 +25,21 @@ from .loci import Point
 from .modular_root_bound import combine_quadrics
 from .msolve import Parametrisation, parametrise
 from .polynomials import Quadric, krawczyk
-from .quadrics import UNIT, Balls, Moving, PoseParametrization, PoseSystem, Rounded, Within
-from .roots import PRECISION, PRECISIONS, Enclosing, Solution, SolutionSet, all_solutions, is_real, sharp
+from .quadrics import UNIT, Balls, MovingPoint, PoseParametrization, PoseSystem, RoundedConic, Within
+from .roots import (
+    PRECISION_DOUBLINGS_MAX,
+    ROOT_ISOLATION_BITS_COUNT,
+    Solution,
+    SolutionEncloser,
+    SolutionSet,
+    all_solutions,
+    is_real,
+    is_sharp,
+)
 
 
 @dataclass(frozen=True, eq=False)
-class Proposed:
+class ProposedSolutions:
     """Solutions that a solver proposes, besides ``extraneous`` ones that are not poses; ``lost``: how many more there
     may be, ``loose`` whether those may form a continuous family; ``far``: the (e, g) (m, 8) at which paths of a
     homotopy to infinity were left."""
@@ -57,21 +66,21 @@ def wholes(system: System, number: int = 0) -> Iterator[PoseSystem]:
                 yield PoseSystem(legs, chart, False)
 
 
-def propose_roots(part: PoseSystem, enough: int | None) -> Proposed | None:
+def propose_roots(part: PoseSystem, enough: int | None) -> ProposedSolutions | None:
     """All solutions, up to rounding, ``enough`` at most; None where there seem to be infinitely many.
 
-    Raises ``MissingExtra``, ``SystemNotSolved`` where msolve is needed."""
+    Raises ``MissingExtra``, ``ExternalSolverFailure`` where msolve is needed."""
     return by_msolve(part) if part.chart.study is None else by_homotopy(part, enough)
 
 
-def by_homotopy(part: PoseSystem, enough: int | None) -> Proposed:
+def by_homotopy(part: PoseSystem, enough: int | None) -> ProposedSolutions:
     """All poses of a rigid body, up to rounding, ``enough`` at most."""
     from flint import acb
 
     assert part.chart.study is not None
     found = ends(part.equations(), part.chart.study, _resting(part), enough)
     values = [[acb(v.real, v.imag) for v in row] for row in found.solutions.tolist()]
-    return Proposed(
+    return ProposedSolutions(
         tuple(zip(values, found.multiple, strict=True)),
         "homotopy",
         found.infinite,
@@ -91,10 +100,10 @@ def _resting(part: PoseSystem) -> tuple[int, ...]:
     return tuple(range(before, before + 3))
 
 
-def by_msolve(part: PoseSystem) -> Proposed | None:
+def by_msolve(part: PoseSystem) -> ProposedSolutions | None:
     """All solutions, distinct ones once; None where they are infinitely many.
 
-    Raises ``MissingExtra``, ``SystemNotSolved``."""
+    Raises ``MissingExtra``, ``ExternalSolverFailure``."""
     equations, nonzero = part.equations(), part.chart.nonzero
     answer = parametrise(equations)
     if answer is None and nonzero is not None:
@@ -102,33 +111,37 @@ def by_msolve(part: PoseSystem) -> Proposed | None:
     if answer is None:
         return None
     solutions = all_solutions(answer.polynomial, lambda t, m: _over(answer, nonzero, t, m))
-    poses = tuple(each for each in solutions if not _no_pose(nonzero, each[0]))
+    poses = tuple(each for each in solutions if not _is_extraneous(nonzero, each[0]))
     lost = answer.polynomial.degree() - len(solutions)
-    return Proposed(poses, "msolve's parametrisation", len(solutions) - len(poses), lost)
+    return ProposedSolutions(poses, "msolve's parametrisation", len(solutions) - len(poses), lost)
 
 
 def enclose_roots(
-    part: PoseSystem, proposed: Proposed, most: Bound | None = None, balls: Within = Balls, farthest: float = FARTHEST
+    part: PoseSystem,
+    proposed: ProposedSolutions,
+    most: Bound | None = None,
+    balls: Within = Balls,
+    farthest: float = SOLUTION_DISTANCE_MAX,
 ) -> SolutionSet:
     """Return the proposals for a choice of legs, as :func:`solve_square` gives it; if a degree bounds their number,
     solutions at infinity are counted too."""
     from flint import ctx
 
-    with ctx.workprec(PRECISION):
+    with ctx.workprec(ROOT_ISOLATION_BITS_COUNT):
         thick = part.equations(balls)
     found = _Tips(balls, part.equations(), thick, part.chart).all_of(
         proposed.solutions, len(proposed.solutions) + proposed.lost, farthest
     )
-    with ctx.workprec(PRECISION):
-        apart = all(root.real and root.thick for root in found.real) and _apart(
+    with ctx.workprec(ROOT_ISOLATION_BITS_COUNT):
+        apart = all(root.real and root.thick for root in found.real) and _has_separate_boxes(
             part.chart,
             thick,
             [root.parameters for root in found.real],
             [values for values in found.values if not is_real(values)],
         )
     if found.far and apart:
-        apart = part.chart.study is None and _far_apart(part, found.distant)
-    with ctx.workprec(PRECISION):
+        apart = part.chart.study is None and _has_separate_far_boxes(part, found.distant)
+    with ctx.workprec(ROOT_ISOLATION_BITS_COUNT):
         wanted = most.most - found.complex if most is not None and most.law == "degree" and apart else 0
         away = 0
         if wanted > 0 and proposed.far is not None and np.isfinite(farthest):
@@ -137,18 +150,18 @@ def enclose_roots(
 
 
 @dataclass(frozen=True, eq=False)
-class _Tips(Enclosing):
+class _Tips(SolutionEncloser):
     """Solutions in the pose's own coordinates, identified by the positions of the legs' tips."""
 
     chart: PoseParametrization
     method = ""
 
     @cached_property
-    def _rounded(self) -> list[Moving]:
-        return self.chart.tips(Rounded)
+    def _rounded(self) -> list[MovingPoint]:
+        return self.chart.tips(RoundedConic)
 
     @cached_property
-    def _moving(self) -> list[Moving]:
+    def _moving(self) -> list[MovingPoint]:
         return self.chart.tips(self.balls)
 
     def distance(self, values: Sequence[Any]) -> float:
@@ -174,13 +187,13 @@ class _Tips(Enclosing):
         return tuple(found)
 
 
-def _far_apart(part: PoseSystem, far: Sequence[Sequence[Any]]) -> bool:
+def _has_separate_far_boxes(part: PoseSystem, far: Sequence[Sequence[Any]]) -> bool:
     """Return True if solutions of the rounded equations beyond ``FARTHEST`` are enclosed, each unknown in its own size,
     no two in one box."""
     from flint import ctx
 
     boxes, quadrics = list[list[Any]](), combine_quadrics(part.equations())
-    with ctx.workprec(PRECISION << PRECISIONS):
+    with ctx.workprec(ROOT_ISOLATION_BITS_COUNT << PRECISION_DOUBLINGS_MAX):
         for values in far:
             sizes = [2 ** max(0, math.frexp(float(abs(v).upper()))[1]) for v in values]
             D = np.diag(np.array([1, *sizes], dtype=object))
@@ -197,7 +210,7 @@ def _far_apart(part: PoseSystem, far: Sequence[Sequence[Any]]) -> bool:
         )
 
 
-def _apart(
+def _has_separate_boxes(
     chart: PoseParametrization, thick: Sequence[Any], real: Sequence[Sequence[Any]], values: Sequence[Sequence[Any]]
 ) -> bool:
     """Return True if all solutions, ``real`` ones in their boxes already, have boxes with one pose each, and no two the
@@ -214,7 +227,9 @@ def _apart(
     if not boxes:
         return True
     m = np.array([[complex(v.mid()) for v in box] for box in boxes])
-    r = np.array([[float(v.rad()) for v in box] for box in boxes]) * (1.0 + BOXES_APART) + BOXES_APART * np.abs(m)
+    r = np.array([[float(v.rad()) for v in box] for box in boxes]) * (
+        1.0 + BOX_SEPARATION_TOL
+    ) + BOX_SEPARATION_TOL * np.abs(m)
     touching = np.all(np.abs(m[:, None] - m[None]) <= r[:, None] + r[None], axis=2)
     return bool(touching.sum() == len(m))
 
@@ -227,21 +242,21 @@ def _is_pose(chart: PoseParametrization, box: Sequence[Any]) -> bool:
     ends, least = np.array([1, *box], dtype=object), float(chart.nonzero.value(box).abs_lower())
     if chart.study is None:
         return least > 0.0
-    return sum(float(abs(e).upper()) ** 2 for e in chart.study[:4].astype(int) @ ends) < FARTHEST * least
+    return sum(float(abs(e).upper()) ** 2 for e in chart.study[:4].astype(int) @ ends) < SOLUTION_DISTANCE_MAX * least
 
 
 def _over(answer: Parametrisation, nonzero: Quadric | None, t: Any, multiplicity: int) -> list[Solution]:
     """Return the solution over a root; none if it is not finite or not known to be a pose."""
     values = answer.others(t)
-    if not all(sharp(v) for v in values):
+    if not all(is_sharp(v) for v in values):
         return []
     told = nonzero is None or float(nonzero.value(values).rad()) < BALL_ZERO
     return [(values, multiplicity)] if told else []
 
 
-def _no_pose(nonzero: Quadric | None, values: Sequence[Any]) -> bool:
+def _is_extraneous(nonzero: Quadric | None, values: Sequence[Any]) -> bool:
     """Return True if ``nonzero`` vanishes, to ``BALL_ZERO``, at complex coordinates."""
     from flint import ctx
 
-    with ctx.workprec(PRECISION << PRECISIONS):
+    with ctx.workprec(ROOT_ISOLATION_BITS_COUNT << PRECISION_DOUBLINGS_MAX):
         return nonzero is not None and bool(nonzero.value(values).contains(0))

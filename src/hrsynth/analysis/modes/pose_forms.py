@@ -20,14 +20,19 @@ from math import prod
 
 import numpy as np
 
-from ...geometry.ranks import singular_decomposition
-from ...geometry.vectors import Array, cross, plane_axes
-from ...tolerances import INDEPENDENT_PLANES, INDEPENDENT_RATES, NO_POSE, RANK_OF_FORMS
+from ...geometry.ranks import decompose_matrix
+from ...geometry.vectors import Array, build_plane_axes, cross
+from ...tolerances import (
+    EXTRANEOUS_QUATERNION_TOL,
+    FORM_PIVOT_MIN_FRACTION,
+    INDEPENDENT_PLANES_SINE_MIN,
+    INDEPENDENT_RATES_MIN,
+)
 from .conditions import OnPlane, PoseCondition
 
-SPREAD = 1.5
+RANDOM_COORDINATE_MAX = 1.5
 """Range of the random s (sizes), of either sign."""
-POINTS = 1.15
+POINTS_PER_FORM_FRACTION = 1.15
 """Points for each form."""
 
 
@@ -61,7 +66,7 @@ class Poses:
     @classmethod
     def planar(cls, n: Array) -> Poses:
         """Poses in a plane with a normal."""
-        return cls(np.array([[1.0, 0.0], *([0.0, v] for v in n)]), np.column_stack([*plane_axes(n)]))
+        return cls(np.array([[1.0, 0.0], *([0.0, v] for v in n)]), np.column_stack([*build_plane_axes(n)]))
 
     @classmethod
     def translating(cls) -> Poses:
@@ -109,7 +114,7 @@ class SquareForms:
             normals = {k: c.n @ poses.moves for k, c in enumerate(rest) if isinstance(c, OnPlane)}
             across = {k: n - basis.T @ (basis @ n) for k, n in normals.items()}
             best = max(across, key=lambda k: (round(float(np.linalg.norm(across[k])), 9), -k), default=-1)
-            if best < 0 or (size := float(np.linalg.norm(across[best]))) < INDEPENDENT_PLANES:
+            if best < 0 or (size := float(np.linalg.norm(across[best]))) < INDEPENDENT_PLANES_SINE_MIN:
                 break
             basis = np.vstack([basis, across[best] / size])
             plane = rest.pop(best)
@@ -119,8 +124,8 @@ class SquareForms:
         others = list[PoseCondition]()
         for each in sorted(rest, key=lambda c: c.degree):
             rate = poses.rates(each)
-            more = np.vstack([rows, rate / max(float(np.linalg.norm(rate)), INDEPENDENT_RATES)])
-            if len(rows) < poses.freedoms and np.linalg.svd(more, compute_uv=False)[-1] > INDEPENDENT_RATES:
+            more = np.vstack([rows, rate / max(float(np.linalg.norm(rate)), INDEPENDENT_RATES_MIN)])
+            if len(rows) < poses.freedoms and np.linalg.svd(more, compute_uv=False)[-1] > INDEPENDENT_RATES_MIN:
                 rows, others = more, [*others, each]
         if len(rows) < poses.freedoms:
             return None
@@ -189,7 +194,9 @@ def _points(shape: tuple[int, int], count: int) -> tuple[Array, Array]:
     """Random unit vectors (n, a) and free coordinates (n, m)."""
     rng = np.random.default_rng(0)
     y = rng.normal(size=(count, shape[0]))
-    return y / np.linalg.norm(y, axis=1)[:, None], rng.uniform(-SPREAD, SPREAD, size=(count, shape[1]))
+    return y / np.linalg.norm(y, axis=1)[:, None], rng.uniform(
+        -RANDOM_COORDINATE_MAX, RANDOM_COORDINATE_MAX, size=(count, shape[1])
+    )
 
 
 @lru_cache(maxsize=64)
@@ -217,7 +224,7 @@ def proposals(forms: SquareForms, t: int, number: int, k: int) -> tuple[Array, A
 
     shape = forms.shape
     size = len(exponents(shape, t))
-    count = int(POINTS * size) + 10
+    count = int(POINTS_PER_FORM_FRACTION * size) + 10
     y, s = _points(shape, count)
     high, R = _basis(shape, t, count), forms.poses.rotations(y)
     rows = [
@@ -228,13 +235,13 @@ def proposals(forms: SquareForms, t: int, number: int, k: int) -> tuple[Array, A
     if rows:
         Q, upper, _ = qr(np.vstack(rows).T, pivoting=True)
         pivots = np.abs(np.diag(upper))
-        space = Q[:, int(np.sum(pivots > RANK_OF_FORMS * pivots[0])) :]
+        space = Q[:, int(np.sum(pivots > FORM_PIVOT_MIN_FRACTION * pivots[0])) :]
     for step in range(k):
         space = _times(shape, t - 2 * step, count, "w")[0] @ space
     if space.shape[1] < number or (not k and space.shape[1] > number):
         return None
     if k:
-        space = singular_decomposition(space)[0][:, :number]
+        space = decompose_matrix(space)[0][:, :number]
     t -= 2 * k
     by_w, by_s = (_times(shape, t, count, what) @ space for what in "ws")
     shifted = _times(shape, t, count, "y") @ space if shape[0] > 1 else np.concatenate([by_w, by_s])
@@ -247,7 +254,7 @@ def proposals(forms: SquareForms, t: int, number: int, k: int) -> tuple[Array, A
     else:
         found = np.ones((space.shape[1], 1), dtype=complex)
     norms = np.sum(found * found, axis=1)
-    real = np.abs(norms) > NO_POSE
+    real = np.abs(norms) > EXTRANEOUS_QUATERNION_TOL
     unit = by_w[0] @ X[:, real]
     free = [np.sum(unit.conj() * each, axis=0) / np.sum(unit.conj() * unit, axis=0) for each in by_s @ X[:, real]]
     found = found[real] / np.sqrt(norms[real])[:, None]

@@ -20,16 +20,16 @@ from typing import Any
 
 import numpy as np
 
-from ...geometry.vectors import Array, cross, plane_axes
-from ...tolerances import PARALLEL
+from ...geometry.vectors import Array, build_plane_axes, cross
+from ...tolerances import EXACT_PARALLEL_SINE_TOL
 from .loci import Circle, Curve, Line, Plane, Point, Reach, Sphere, length
 from .polynomials import Quadric
 
-BITS = 52
+COORDINATE_BITS_COUNT = 52
 """Coordinates are integers in units of the size times 2 to the minus this."""
 
-UNIT = 1 << BITS
-SLACK = 8.0
+UNIT = 1 << COORDINATE_BITS_COUNT
+WORKING_FRAME_ROUNDING_TOL = 8.0
 """Units by which a coordinate may be wrong after turning into the working frame: sixteen roundings of a float."""
 
 
@@ -68,22 +68,22 @@ def spatial_frame(curves: Sequence[Reach], size: float) -> WorkingFrame:
     directions = [curve.axis for curve in curves if isinstance(curve, Circle)]
     directions += [curve.direction for curve in curves if isinstance(curve, Line)]
     directions += [curve.normal for curve in curves if isinstance(curve, Plane)]
-    shared = [sum(_parallel(a, b) for b in directions) for a in directions]
+    shared = [sum(_is_parallel(a, b) for b in directions) for a in directions]
     n = directions[int(np.argmax(shared))] if directions else np.array([0.0, 0.0, 1.0])
-    return WorkingFrame(_middle(curves), np.array([*plane_axes(n), n]), _power(size), n)
+    return WorkingFrame(_middle(curves), np.array([*build_plane_axes(n), n]), _power(size), n)
 
 
 def planar_frame(curves: Sequence[Reach], X_plane: Array, size: float) -> WorkingFrame:
     """Two axes in the plane of X_plane (4, 4), the first along the direction that most lines share."""
     lines = [curve.direction for curve in curves if isinstance(curve, Line)]
-    shared = [sum(_parallel(a, b) for b in lines) for a in lines]
+    shared = [sum(_is_parallel(a, b) for b in lines) for a in lines]
     first = lines[int(np.argmax(shared))] if lines else X_plane[:3, 0]
     n = X_plane[:3, 2]
-    axes = plane_axes(n, first)
+    axes = build_plane_axes(n, first)
     return WorkingFrame(_middle(curves), axes, _power(size), axes[0])
 
 
-class Rounded:
+class RoundedConic:
     """Numbers of a conic as integers: what the count of solutions is proved for."""
 
     @staticmethod
@@ -106,13 +106,13 @@ class Within:
         return np.array([arb(round(float(value) * UNIT), self.slack + more) for value in x], dtype=object)
 
 
-Balls = Within(SLACK)
+Balls = Within(WORKING_FRAME_ROUNDING_TOL)
 """The balls of input that is known as exactly as floats allow."""
 
-Numbers = type[Rounded] | Within
+Numbers = type[RoundedConic] | Within
 
 
-def conic(curve: Curve, frame: WorkingFrame, turn: float, numbers: Numbers = Rounded) -> Conic:
+def conic(curve: Curve, frame: WorkingFrame, turn: float, numbers: Numbers = RoundedConic) -> Conic:
     """A curve in a working frame; t = 0 is at θ = ``turn`` on a circle, at s = 0 on a line."""
     c = numbers.vector(frame.point(curve.centre))
     zero = c * 0
@@ -131,10 +131,10 @@ def conic(curve: Curve, frame: WorkingFrame, turn: float, numbers: Numbers = Rou
 def direction(along: Array, frame: WorkingFrame, numbers: Numbers) -> Any:
     """A unit direction as numbers, made exact where it nearly is the frame's own or normal to that."""
     d = frame.R @ along
-    if _parallel(along, frame.special):
-        return numbers.vector(np.round(d), PARALLEL * UNIT * (not _same(along, frame.special)))
-    if abs(float(along @ frame.special)) < PARALLEL:
-        return numbers.vector(np.where(np.abs(d) < PARALLEL, 0.0, d), PARALLEL * UNIT)
+    if _is_parallel(along, frame.special):
+        return numbers.vector(np.round(d), EXACT_PARALLEL_SINE_TOL * UNIT * (not _is_equal(along, frame.special)))
+    if abs(float(along @ frame.special)) < EXACT_PARALLEL_SINE_TOL:
+        return numbers.vector(np.where(np.abs(d) < EXACT_PARALLEL_SINE_TOL, 0.0, d), EXACT_PARALLEL_SINE_TOL * UNIT)
     return numbers.vector(d)
 
 
@@ -152,8 +152,8 @@ def spokes(circle: Circle, frame: WorkingFrame, turn: float, numbers: Numbers) -
     cos, sin = np.cos(turn) * circle.radius, np.sin(turn) * circle.radius
     first, second = cos * circle.start + sin * circle.across, cos * circle.across - sin * circle.start
     a, b = frame.vector(first), frame.vector(second)
-    if len(a) == 2 or _parallel(circle.axis, frame.special):
-        more = PARALLEL * UNIT * (len(a) == 3 and not _same(circle.axis, frame.special))
+    if len(a) == 2 or _is_parallel(circle.axis, frame.special):
+        more = EXACT_PARALLEL_SINE_TOL * UNIT * (len(a) == 3 and not _is_equal(circle.axis, frame.special))
         sign = 1 if a[0] * b[1] - a[1] * b[0] > 0 else -1
         a = numbers.vector(np.where(np.arange(len(a)) < 2, a, 0.0), more)
         a[2:] = a[2:] * 0
@@ -201,11 +201,11 @@ def _middle(curves: Sequence[Reach]) -> Array:
     return np.asarray(sum(curve.centre for curve in curves) / len(curves))
 
 
-def _parallel(a: Array, b: Array) -> bool:
-    return length(cross(a, b)) < PARALLEL
+def _is_parallel(a: Array, b: Array) -> bool:
+    return length(cross(a, b)) < EXACT_PARALLEL_SINE_TOL
 
 
-def _same(a: Array, b: Array) -> bool:
+def _is_equal(a: Array, b: Array) -> bool:
     return length(cross(a, b)) < 1e-15
 
 
@@ -215,7 +215,7 @@ def _power(size: float) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Moving(Conic):
+class MovingPoint(Conic):
     """A point of a moving body: N, shape (n + 1, n + 1, d), Q and w, shape (n + 1, n + 1).
 
     Entry i, j is the coefficient of xᵢ xⱼ with x₀ = 1. N/w is in units of size·2⁻⁵², lengths among the x in sizes."""
@@ -233,7 +233,7 @@ class PoseParametrization:
     frame: WorkingFrame
     count: int
     reaches: tuple[Reach, ...]
-    tips: Callable[[Numbers], list[Moving]]
+    tips: Callable[[Numbers], list[MovingPoint]]
     own: tuple[Any, ...]
     place: Callable[[Sequence[float]], Array]
     nonzero: Quadric | None = None
@@ -256,7 +256,7 @@ class PoseSystem:
         """The coordinates of the system's pose."""
         return self.chart.place(parameters)
 
-    def equations(self, numbers: Numbers = Rounded) -> list[Quadric]:
+    def equations(self, numbers: Numbers = RoundedConic) -> list[Quadric]:
         """The quadrics, first those of the coordinates themselves."""
         chart = self.chart
         tips = chart.tips(numbers)
@@ -291,7 +291,7 @@ def conditions(tip: Conic, reach: Reach, frame: WorkingFrame, numbers: Numbers) 
 def normals(reach: Line | Circle | Plane) -> tuple[Array, ...]:
     """The normal of a plane or of a circle's, or of two planes that hold a line."""
     if isinstance(reach, Line):
-        return tuple(plane_axes(reach.direction))
+        return tuple(build_plane_axes(reach.direction))
     return (reach.axis if isinstance(reach, Circle) else reach.normal,)
 
 
@@ -322,7 +322,7 @@ def linear(count: int, slopes: Sequence[tuple[int, Any]], offset: Any) -> Any:
     return form
 
 
-def shifting(count: int, offset: Any, turns: Sequence[tuple[int, Any]] = ()) -> Moving:
+def shifting(count: int, offset: Any, turns: Sequence[tuple[int, Any]] = ()) -> MovingPoint:
     """The tip UNIT p + offset + Σ x_k v_k, with p the first coordinates and (k, v_k) the turns; where there are two of
     them, x_k² + x_l² = 1 and they are spokes, normal to each other and of one length; one is a slide."""
     d = len(offset)
@@ -337,7 +337,7 @@ def shifting(count: int, offset: Any, turns: Sequence[tuple[int, Any]] = ()) -> 
         Q[k, k] = UNIT * UNIT
         for other, v in turns:
             Q[k, other] = 2 * UNIT * v[k - 1]
-    return Moving(N, Q, linear(count, (), 1))
+    return MovingPoint(N, Q, linear(count, (), 1))
 
 
 def on_circle(count: int, cosine: int, sine: int) -> Any:

@@ -13,15 +13,15 @@ from typing import Any
 import numpy as np
 
 from ...errors import BadRequest
-from ...geometry.so3 import exponential, logarithm
-from ...geometry.vectors import Array, cross, pose
-from ...tolerances import SAME_DIRECTION, SAME_POINT
+from ...geometry.so3 import convert_rotations_to_vectors, convert_vectors_to_rotations
+from ...geometry.vectors import Array, build_pose, cross
+from ...tolerances import DIRECTION_SINE_TOL, POINT_DISTANCE_TOL
 from .constrained_platform import System, register
 from .loci import Circle, Curve, Line, Point, Surface, curves_of, extent, length
 from .polynomials import Equation
 from .quadrics import (
     Conic,
-    Moving,
+    MovingPoint,
     Numbers,
     PoseParametrization,
     WorkingFrame,
@@ -60,9 +60,11 @@ class Planar(System):
                 if isinstance(curve, Line)
                 else 0.0
             )
-            if off > SAME_DIRECTION:
-                raise BadRequest("sine of a locus's angle with the plane of motion", off, f"at most {SAME_DIRECTION}")
-        if self.surfaces:
+            if off > DIRECTION_SINE_TOL:
+                raise BadRequest(
+                    "sine of a locus's angle with the plane of motion", off, f"at most {DIRECTION_SINE_TOL}"
+                )
+        if self.has_surface_loci:
             raise BadRequest("the loci of tips in a plane", "a surface", "points, lines and circles")
 
     def position(self, origin: Array) -> Array:
@@ -96,7 +98,7 @@ class Planar(System):
         """x, y, cos and sin of the turn from the working frame to the platform's."""
         frame = self.frame
 
-        def tips(numbers: Numbers) -> list[Moving]:
+        def tips(numbers: Numbers) -> list[MovingPoint]:
             found = []
             for tip in self.tips:
                 b = numbers.vector(tip / frame.size)
@@ -114,7 +116,7 @@ class Planar(System):
         """Two pivots, a pivot and a curve, or three curves in each order that two tips apart allow."""
         points = [k for k, curve in enumerate(self.curves) if isinstance(curve, Point)]
         moving = [k for k in range(len(self.curves)) if k not in points]
-        apart = SAME_POINT * self.size
+        apart = POINT_DISTANCE_TOL * self.size
         for i, j in combinations(points, 2):
             if length(self.tips[i] - self.tips[j]) > apart:
                 yield resting((i, j), self._square((i, j), False).place(()), False)
@@ -211,7 +213,7 @@ class Spatial(System):
 
     def pose(self, q: Array) -> Array:
         """The platform's frame in the base frame; shape (4, 4)."""
-        return pose(q[:3], exponential(q[3:]))
+        return build_pose(q[:3], convert_vectors_to_rotations(q[3:]))
 
     def tips_at(self, q: Array) -> Array:
         """Return the positions of the tips at a pose; shape (legs, 3), metres."""
@@ -235,7 +237,7 @@ class Spatial(System):
         choices += [(i, j, k) for k in points for i, j in combinations(moving, 2)] + list(combinations(moving, 3))
         for legs in choices:
             a, b, c = self.tips[list(legs)]
-            if length(cross(b - a, c - a)) > SAME_POINT * self.size**2:
+            if length(cross(b - a, c - a)) > POINT_DISTANCE_TOL * self.size**2:
                 yield self._square(legs, len(moving) == len(self.curves) == 3)
 
     def _square(self, legs: tuple[int, ...], whole: bool) -> SquareSystem:
@@ -267,7 +269,7 @@ class Spatial(System):
             free = iter(parameters)
             three = np.array([curve.at(0.0 if isinstance(curve, Point) else next(free)) for curve in curves])
             R = _triad(three) @ _triad(b).T
-            return np.array([*(three.mean(axis=0) - R @ b.mean(axis=0)), *logarithm(R)])
+            return np.array([*(three.mean(axis=0) - R @ b.mean(axis=0)), *convert_rotations_to_vectors(R)])
 
         return SquareSystem(legs, unknowns, frame, build, place, whole)
 

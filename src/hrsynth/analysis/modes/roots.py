@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from ...tolerances import FARTHEST, NEARLY_DOUBLE, RANK_GAP, SHARP_ROOT
+from ...tolerances import DOUBLE_SOLUTION_DISTANCE_TOL, RANK_GAP_MIN, SHARP_ROOT, SOLUTION_DISTANCE_MAX
 from .loci import Circle, Curve
 from .polynomials import Eliminant, Equation, Polynomial, cycle, height, krawczyk, pair, primitive, univariate, without
 from .quadrics import UNIT, Balls, Conic, Within, WorkingFrame, parameter
@@ -25,10 +25,10 @@ from .square_systems import SquareSystem
 if TYPE_CHECKING:
     from flint import fmpz_poly
 
-PRECISION = 128
+ROOT_ISOLATION_BITS_COUNT = 128
 """Bits with which roots are isolated first."""
 
-PRECISIONS = 4
+PRECISION_DOUBLINGS_MAX = 4
 """Number of times that the precision is doubled before another unknown is kept."""
 
 STARTS = (0.0, 1.1, -0.9)
@@ -38,7 +38,7 @@ Solution = tuple[list[Any], int]
 """Balls of all unknowns, and the multiplicity."""
 
 
-NEARLY_REAL = 1e-2
+NEARLY_REAL_ROOT_TOL = 1e-2
 """Distance from real ones within which a complex solution has to be shown to be none of them for all input."""
 
 LOUD = 1 << 16
@@ -94,7 +94,7 @@ class SolutionSet:
     """Origin of the angles of circles (rad), besides each unknown's own origin."""
 
 
-def solve_square(square: SquareSystem, balls: Within = Balls, farthest: float = FARTHEST) -> SolutionSet:
+def solve_square(square: SquareSystem, balls: Within = Balls, farthest: float = SOLUTION_DISTANCE_MAX) -> SolutionSet:
     """All solutions of a square system: those of the rounded input counted, those of all in the balls enclosed; those
     beyond the distance ``farthest`` (sizes) are taken to be at infinity."""
     from flint import ctx
@@ -104,16 +104,16 @@ def solve_square(square: SquareSystem, balls: Within = Balls, farthest: float = 
     fallback = SolutionSet(complete=False)
     for turn in STARTS:
         equations = square.equations(turn)
-        with ctx.workprec(PRECISION):
+        with ctx.workprec(ROOT_ISOLATION_BITS_COUNT):
             conics = square.conics(turn, balls)
             thick = square.build(conics, balls)
         noisy = _perturb(equations, thick)
         zeros = 0
         for (order, eliminant), (_, other) in zip(_eliminants(equations), _eliminants(noisy), strict=True):
-            if _vanishes(eliminant.polynomial, other.polynomial):
+            if _is_zero_to_rounding(eliminant.polynomial, other.polynomial):
                 zeros += 1
                 continue
-            found = _roots(_Enclosing(balls, equations, thick, square, turn, conics), order, eliminant, farthest)
+            found = _roots(_SquareEncloser(balls, equations, thick, square, turn, conics), order, eliminant, farthest)
             if found.complete:
                 return replace(found, turn=turn)
             fallback = max(fallback, found, key=lambda each: each.complex)
@@ -154,12 +154,12 @@ def _spread(ball: Any) -> float:
     return 0.0 if isinstance(ball, int) else float(ball.rad())
 
 
-def _vanishes(polynomial: fmpz_poly, noisy: fmpz_poly) -> bool:
+def _is_zero_to_rounding(polynomial: fmpz_poly, noisy: fmpz_poly) -> bool:
     """Return True if a resultant is zero, or of the size that rounding gives zero."""
     return not polynomial or height(polynomial - noisy) * LOUD > height(polynomial)
 
 
-def _roots(square: _Enclosing, order: tuple[int, ...], eliminant: Eliminant, farthest: float) -> SolutionSet:
+def _roots(square: _SquareEncloser, order: tuple[int, ...], eliminant: Eliminant, farthest: float) -> SolutionSet:
     """The solutions over the roots of an eliminant."""
     from flint import ctx, fmpz_poly
 
@@ -175,11 +175,11 @@ def _roots(square: _Enclosing, order: tuple[int, ...], eliminant: Eliminant, far
         polynomial.degree(),
         farthest,
     )
-    with ctx.workprec(PRECISION):
+    with ctx.workprec(ROOT_ISOLATION_BITS_COUNT):
         surely = all(
-            square.complex_for_all(values)
+            square.is_proved_complex(values)
             for values in found.values
-            if NEARLY_DOUBLE / 2 <= off_real(values) < NEARLY_REAL
+            if DOUBLE_SOLUTION_DISTANCE_TOL / 2 <= off_real(values) < NEARLY_REAL_ROOT_TOL
         )
     return replace(found, extraneous=extraneous, complete=found.complete and not at_infinity and surely)
 
@@ -189,8 +189,8 @@ def all_solutions(polynomial: fmpz_poly, over: Callable[[Any, int], list[Solutio
     from flint import ctx
 
     resolved: list[Solution] = []
-    precision = PRECISION
-    for _ in range(PRECISIONS):
+    precision = ROOT_ISOLATION_BITS_COUNT
+    for _ in range(PRECISION_DOUBLINGS_MAX):
         with ctx.workprec(precision):
             resolved = [each for x, m in _isolate(polynomial) for each in over(x, m)]
             if sum(m for _, m in resolved) == polynomial.degree():
@@ -205,10 +205,10 @@ def _over(
     """Return the solutions over a root, each with its multiplicity; none if they cannot be separated from infinity or
     from each other."""
     one = _restore_order(order, (x, *eliminant.others(x)))
-    if _finite(one, half_angles):
+    if _has_finite_values(one, half_angles):
         return [(one, multiplicity)]
     found = [_restore_order(order, (x, *others)) for others in eliminant.several(x) or ()]
-    if len(found) != multiplicity or not all(_finite(values, half_angles) for values in found):
+    if len(found) != multiplicity or not all(_has_finite_values(values, half_angles) for values in found):
         return []
     return [(values, 1) for values in found]
 
@@ -227,13 +227,15 @@ def _restore_order(order: tuple[int, ...], values: Sequence[Any]) -> list[Any]:
     return found
 
 
-def _finite(values: Sequence[Any], half_angles: Sequence[bool]) -> bool:
+def _has_finite_values(values: Sequence[Any], half_angles: Sequence[bool]) -> bool:
     """Return True if all values are finite and known well, and none a half-angle tangent at which a circle is at
     infinity."""
-    return all(sharp(v) and not (half and (1 + v * v).contains(0)) for v, half in zip(values, half_angles, strict=True))
+    return all(
+        is_sharp(v) and not (half and (1 + v * v).contains(0)) for v, half in zip(values, half_angles, strict=True)
+    )
 
 
-def sharp(value: Any) -> bool:
+def is_sharp(value: Any) -> bool:
     """Return True if a ball is so small that it separates solutions on both sides of a denominator's zero."""
     return bool(value.is_finite()) and float(value.rad()) <= SHARP_ROOT * (1.0 + float(abs(value.mid())))
 
@@ -249,14 +251,14 @@ def off_real(values: Sequence[Any]) -> float:
     return max(abs(float(v.imag)) / (1.0 + abs(float(v.real))) for v in values)
 
 
-def _almost_real(values: Sequence[Any]) -> bool:
+def _is_almost_real(values: Sequence[Any]) -> bool:
     """Return True if a solution is the first of a conjugate pair that nearly is one real solution."""
     first = next((float(v.imag) for v in values if not v.imag.is_zero()), 0.0)
-    return off_real(values) < NEARLY_DOUBLE / 2 and first > 0
+    return off_real(values) < DOUBLE_SOLUTION_DISTANCE_TOL / 2 and first > 0
 
 
 @dataclass(frozen=True, eq=False)
-class Enclosing(ABC):
+class SolutionEncloser(ABC):
     """Enclosures of the solutions of a choice of legs: its equations, of the rounded input and of the exact one."""
 
     balls: Within
@@ -283,9 +285,9 @@ class Enclosing(ABC):
         from flint import ctx
 
         resolved, far, undecided = _nearer(solutions, self.distance, farthest)
-        with ctx.workprec(PRECISION):
+        with ctx.workprec(ROOT_ISOLATION_BITS_COUNT):
             real = tuple(self._enclose([v.real for v in values], m) for values, m in resolved if is_real(values))
-            real += tuple(self._middle(values) for values, _ in resolved if _almost_real(values))
+            real += tuple(self._middle(values) for values, _ in resolved if _is_almost_real(values))
         count, values = sum(m for _, m in resolved), tuple(values for values, _ in resolved)
         near = set(map(id, values))
         distant = tuple(values for values, _ in solutions if id(values) not in near)
@@ -321,7 +323,7 @@ class Enclosing(ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class _Enclosing(Enclosing):
+class _SquareEncloser(SolutionEncloser):
     """A square system with circles counted from ``turn``."""
 
     part: SquareSystem
@@ -330,7 +332,7 @@ class _Enclosing(Enclosing):
     """The unknowns' curves in balls."""
     method = "exact resultant"
 
-    def complex_for_all(self, values: Sequence[Any]) -> bool:
+    def is_proved_complex(self, values: Sequence[Any]) -> bool:
         """Return True if a complex solution is proved to be no real one for all input in the balls."""
         box = krawczyk(self.thick, values)
         return box is not None and any(not v.imag.contains(0) for v in box)
@@ -399,7 +401,7 @@ def _nearer(
     beyond = [(size, m) for size, (_, m) in placed if size > farthest]
     near = [(size, each) for size, each in placed if size <= farthest]
     nearest_beyond = min((size for size, _ in beyond), default=np.inf)
-    if max((size for size, _ in near), default=0.0) * RANK_GAP > nearest_beyond:
+    if max((size for size, _ in near), default=0.0) * RANK_GAP_MIN > nearest_beyond:
         return list(solutions), 0, True
     return [each for _, each in near], sum(m for _, m in beyond), False
 
@@ -413,6 +415,6 @@ def _closest(solutions: Sequence[Sequence[Any]]) -> float:
     return float((apart.max(axis=2) + np.diag([np.inf] * len(values))).min())
 
 
-def nearly_double(roots: SolutionSet) -> bool:
+def has_nearly_double_solution(roots: SolutionSet) -> bool:
     """Return True if two solutions coincide, or nearly: the pose is singular."""
-    return roots.closest < NEARLY_DOUBLE or any(root.multiplicity > 1 for root in roots.real)
+    return roots.closest < DOUBLE_SOLUTION_DISTANCE_TOL or any(root.multiplicity > 1 for root in roots.real)

@@ -11,16 +11,27 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...budgets import SEARCH_ITERATIONS, SEARCH_MOTIONS, SEARCH_QUIET, SEARCH_STARTS
+from ...budgets import (
+    MODE_SEARCH_ITERATIONS_MAX,
+    MODE_SEARCH_QUIET_STARTS_COUNT,
+    MODE_SEARCH_STARTS_MAX,
+    SEARCH_SELF_MOTIONS_MAX,
+)
 from ...errors import UndefinedValue
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.limits import outside
+from ...kinematics.limits import list_joints_beyond
 from ...kinematics.pinocchio_model import PinocchioModel
 from ...kinematics.tasks import FixedValuesTask, solve
-from ...kinematics.velocity_relation import ObservationModel, relation
+from ...kinematics.velocity_relation import ObservationModel, compute_relation
 from ...progress import report
-from ...tolerances import CLOSED, NEAR_MODE, SAME_RELATION, SOLVED, SURELY_SOMETHING
+from ...tolerances import (
+    CLOSURE_RESIDUAL_TOL,
+    CLOSURE_SOLVER_TOL,
+    NEAR_MODE_DISTANCE_MAX,
+    NONZERO_SINGULAR_VALUE_MIN,
+    RELATION_ANGLE_TOL,
+)
 from .self_motions import SelfMotion, bodies_apart, self_motion
 
 
@@ -75,22 +86,26 @@ def search(goal: ClosedConfiguration, observation_model: ObservationModel, bodie
     is free, self-motions are followed."""
     model, rng = goal.model, np.random.default_rng(0)
     held = FixedValuesTask.at(model, goal.q, observation_model.reference, observation_model.observations)
-    own = self_motion(goal, observation_model, bodies, goal=True) if leaves_free(goal, observation_model) else None
+    own = (
+        self_motion(goal, observation_model, bodies, goal=True)
+        if has_unobserved_motion(goal, observation_model)
+        else None
+    )
     found = [FoundMode(goal, _poses(goal, bodies), goal.residual, 1)] if own is None else []
     motions = [] if own is None else [own]
     starts = closed = loose = quiet = 0
     near = list[FoundMode]()
-    while starts < SEARCH_STARTS and quiet < SEARCH_QUIET:
+    while starts < MODE_SEARCH_STARTS_MAX and quiet < MODE_SEARCH_QUIET_STARTS_COUNT:
         number, starts = starts, starts + 1
         report("starts")
         far = np.pi if number % 2 else rng.uniform(0.0, np.pi)
         start = model.integrate(model.q0, rng.uniform(-far, far, model.nv))
         try:
-            q, residual = solve(model, start, held, tolerance=SOLVED, iterations=SEARCH_ITERATIONS)
+            q, residual = solve(model, start, held, tolerance=CLOSURE_SOLVER_TOL, iterations=MODE_SEARCH_ITERATIONS_MAX)
         except UndefinedValue:  # along the path a point came to a camera's centre
             continue
-        if residual > CLOSED:
-            if residual <= NEAR_MODE:
+        if residual > CLOSURE_RESIDUAL_TOL:
+            if residual <= NEAR_MODE_DISTANCE_MAX:
                 _add_near(near, model, q, residual, bodies, observation_model)
             continue
         closed, quiet = closed + 1, quiet + 1
@@ -100,23 +115,29 @@ def search(goal: ClosedConfiguration, observation_model: ObservationModel, bodie
             (
                 k
                 for k, mode in enumerate(found)
-                if bodies_apart(mode.bodies, poses, observation_model, model.length) <= SAME_RELATION
+                if bodies_apart(mode.bodies, poses, observation_model, model.length) <= RELATION_ANGLE_TOL
             ),
             None,
         )
         if known is not None:
             mode = found[known]
-            better = mode.configuration is not goal and outside(model, mode.configuration.q) and not outside(model, q)
+            better = (
+                mode.configuration is not goal
+                and list_joints_beyond(model, mode.configuration.q)
+                and not list_joints_beyond(model, q)
+            )
             found[known] = FoundMode(at if better else mode.configuration, mode.bodies, mode.residual, mode.met + 1)
-        elif not leaves_free(at, observation_model):
+        elif not has_unobserved_motion(at, observation_model):
             found.append(FoundMode(at, poses, residual, 1))
             quiet = 0
         elif (
-            on := next((k for k, motion in enumerate(motions) if motion.passes(at, observation_model)), None)
+            on := next((k for k, motion in enumerate(motions) if motion.has_visited(at, observation_model)), None)
         ) is not None:
             motions[on] = replace(motions[on], hits=motions[on].hits + 1)
         else:
-            motion = self_motion(at, observation_model, bodies, motions) if len(motions) < SEARCH_MOTIONS else None
+            motion = (
+                self_motion(at, observation_model, bodies, motions) if len(motions) < SEARCH_SELF_MOTIONS_MAX else None
+            )
             if motion is None:
                 loose += 1
             elif motion in motions:
@@ -137,20 +158,20 @@ def _add_near(
     observation_model: ObservationModel,
 ) -> None:
     """Close the loops where a start ended that met loops and measurements nearly, and add that pose if it is new."""
-    q, left = solve(model, q, tolerance=SOLVED)
-    if left > CLOSED:
+    q, left = solve(model, q, tolerance=CLOSURE_SOLVER_TOL)
+    if left > CLOSURE_RESIDUAL_TOL:
         return
     at = ClosedConfiguration.of(model, q)
     poses = _poses(at, bodies)
-    if all(bodies_apart(each.bodies, poses, observation_model, model.length) > NEAR_MODE for each in near):
+    if all(bodies_apart(each.bodies, poses, observation_model, model.length) > NEAR_MODE_DISTANCE_MAX for each in near):
         near.append(FoundMode(at, poses, residual, 1))
 
 
-def leaves_free(at: ClosedConfiguration, observation_model: ObservationModel) -> bool:
+def has_unobserved_motion(at: ClosedConfiguration, observation_model: ObservationModel) -> bool:
     """Return True if the measured values leave the platform a dof, to first order or nearly: then rounding makes closed
     configurations about one that is not."""
-    there = relation(at, observation_model)
-    return there.rank < there.dof.value or there.seen.weakest < SURELY_SOMETHING
+    there = compute_relation(at, observation_model)
+    return there.rank < there.dof.value or there.seen.weakest < NONZERO_SINGULAR_VALUE_MIN
 
 
 def _poses(at: ClosedConfiguration, bodies: Sequence[str]) -> dict[str, Array]:

@@ -16,28 +16,28 @@ from typing import Annotated
 
 import numpy as np
 
-from ...budgets import MOTION_HALVINGS, MOTION_STEPS, SEARCH_ITERATIONS
-from ...geometry.ranks import range_basis
-from ...geometry.screws import point_velocity
-from ...geometry.so3 import logarithm
-from ...geometry.vectors import Array, pose, pose_difference, transform
+from ...budgets import MODE_SEARCH_ITERATIONS_MAX, SELF_MOTION_STEP_HALVINGS_MAX, SELF_MOTION_STEPS_MAX
+from ...geometry.ranks import compute_range_basis
+from ...geometry.screws import compute_point_velocity
+from ...geometry.so3 import convert_rotations_to_vectors
+from ...geometry.vectors import Array, build_pose, compare_poses, transform
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.limits import outside
+from ...kinematics.limits import list_joints_beyond
 from ...kinematics.pinocchio_model import PinocchioModel
-from ...kinematics.tasks import FixedValuesTask, shorten_step, solve, system
+from ...kinematics.tasks import FixedValuesTask, shorten_step, solve, stack_task
 from ...kinematics.velocity_relation import ObservationModel
 from ...records import As, Record, Recorded, Shown
 from ...tolerances import (
-    CLOSED,
-    INVERTED,
-    MOTION_BEND,
-    MOTION_FREE,
-    MOTION_LEAST,
-    MOTION_NEAR,
-    MOTION_STEP,
-    SAME_RELATION,
-    SOLVED,
-    SURELY_SOMETHING,
+    CLOSURE_RESIDUAL_TOL,
+    CLOSURE_SOLVER_TOL,
+    NONZERO_SINGULAR_VALUE_MIN,
+    PSEUDOINVERSE_CUTOFF_FRACTION,
+    RELATION_ANGLE_TOL,
+    SELF_MOTION_BEND_TOL,
+    SELF_MOTION_LENGTH_MIN,
+    SELF_MOTION_PROBE_FRACTION,
+    SELF_MOTION_SINGULAR_TOL,
+    SELF_MOTION_STEP_MAX,
 )
 
 
@@ -83,12 +83,14 @@ class SelfMotion(Record):
         )
         return f"of dimension {self.dimension}, which moves {moving} (followed over {far}{ends})"
 
-    def passes(self, at: ClosedConfiguration, observation_model: ObservationModel) -> bool:
+    def has_visited(self, at: ClosedConfiguration, observation_model: ObservationModel) -> bool:
         """Return True if it was followed to where the platform's bodies are at a closed configuration, to a step."""
         poses = {body: at.pose(body) for body in self.way[0]}
-        return any(bodies_apart(poses, each, observation_model, at.model.length) <= MOTION_STEP for each in self.way)
+        return any(
+            bodies_apart(poses, each, observation_model, at.model.length) <= SELF_MOTION_STEP_MAX for each in self.way
+        )
 
-    def like(self, dimension: int, links: Sequence[str]) -> bool:
+    def may_continue_to(self, dimension: int, links: Sequence[str]) -> bool:
         """Return True if a closed configuration with these mobile links and this dimension may be on it, beyond where
         it was followed."""
         return not (self.dimension == 1 and self.returns) and (self.dimension, self.links) == (dimension, tuple(links))
@@ -122,10 +124,10 @@ def self_motion(
     ways, near = walker.around(at.q)
     if not ways.shape[1]:
         return None
-    alike = next((each for each in known if each.like(ways.shape[1], walker.links_moved(at.q, near))), None)
+    alike = next((each for each in known if each.may_continue_to(ways.shape[1], walker.links_moved(at.q, near))), None)
     if alike is not None:
         return alike
-    walks = [walk for w in ways.T if (walk := walker.walk(at.q, w)).far >= MOTION_LEAST]
+    walks = [walk for w in ways.T if (walk := walker.walk(at.q, w)).far >= SELF_MOTION_LENGTH_MIN]
     if not walks:
         return None
     longest = max(walks, key=lambda walk: walk.far)
@@ -164,7 +166,7 @@ def follow_motion(
 
 
 @dataclass(frozen=True, eq=False)
-class _Followed:
+class _FollowedPath:
     """Configurations along one tangent and back along the other, how far the platform went (characteristic lengths,
     radians), and whether it came back; joints that are beyond their limits on the way, and how far the platform went
     before the first."""
@@ -195,43 +197,43 @@ class _Follower:
         """The poses (4, 4) of the platform's bodies."""
         return dict(zip(self.names, self.model.poses(q, self.names), strict=True))
 
-    def tangents(self, q: Array, least: float = SURELY_SOMETHING) -> tuple[Array, Array]:
+    def tangents(self, q: Array, least: float = NONZERO_SINGULAR_VALUE_MIN) -> tuple[Array, Array]:
         """Return the twists of the bodies to first order, where singular values below ``least`` are zero: an
         orthonormal basis, (rows, d), and joint velocities (nv, d), without internal ones, that make them."""
-        _, values, right = np.linalg.svd(system(self.model, q, self.held)[1])
+        _, values, right = np.linalg.svd(stack_task(self.model, q, self.held)[1])
         kernel = right[int(np.sum(values > least * values.max(initial=1.0))) :].T
         X, V = self.model.frames(q, self.names)
         point = self.observation_model.point
         rows = [
             v
             if point is None or name != self.observation_model.platform
-            else point_velocity(v, x[:3, :3] @ point / self.model.length)
+            else compute_point_velocity(v, x[:3, :3] @ point / self.model.length)
             for name, x, v in zip(self.names, X, V, strict=True)
         ]
         moves = np.vstack(rows) @ kernel
-        basis, _ = range_basis(moves, 1.0)
-        return basis, np.asarray(kernel @ np.linalg.lstsq(moves, basis, rcond=INVERTED)[0])
+        basis, _ = compute_range_basis(moves, 1.0)
+        return basis, np.asarray(kernel @ np.linalg.lstsq(moves, basis, rcond=PSEUDOINVERSE_CUTOFF_FRACTION)[0])
 
     def around(self, q: Array) -> tuple[Array, list[Array]]:
         """Return the directions of closed configurations about one: an orthonormal basis of the bodies' twists that
-        lead to them (rows, d), fewer than :meth:`tangents` if a dof is one to first order only; and the
+        lead to them (rows, d), fewer than :meth:`build_tangents` if a dof is one to first order only; and the
         configurations."""
-        basis, joints = self.tangents(q, MOTION_FREE)
+        basis, joints = self.tangents(q, SELF_MOTION_SINGULAR_TOL)
         found, came, home, rng = [], [], self.bodies(q), np.random.default_rng(0)
         size = basis.shape[1]
         if not size:
             return basis, []
         for c in np.vstack([np.eye(size), rng.normal(size=(size, size))]):
             step = joints @ (c / np.linalg.norm(c))
-            part = MOTION_NEAR / max(1.0, float(np.abs(step).max()))  # of a unit twist of the bodies
+            part = SELF_MOTION_PROBE_FRACTION / max(1.0, float(np.abs(step).max()))  # of a unit twist of the bodies
             there, residual = solve(
                 self.model,
                 self.model.integrate(q, part * step),
                 self.held,
-                tolerance=SOLVED,
-                iterations=SEARCH_ITERATIONS,
+                tolerance=CLOSURE_SOLVER_TOL,
+                iterations=MODE_SEARCH_ITERATIONS_MAX,
             )
-            if residual <= CLOSED:
+            if residual <= CLOSURE_RESIDUAL_TOL:
                 found.append(there)
                 came.append(
                     np.concatenate(
@@ -241,16 +243,16 @@ class _Follower:
                     / part
                 )
         _, values, right = np.linalg.svd(np.reshape(came, (-1, size)), full_matrices=False)
-        return basis @ right[values > MOTION_BEND].T, found
+        return basis @ right[values > SELF_MOTION_BEND_TOL].T, found
 
     def _twist(self, name: str, X: Array, home: Array) -> tuple[Array, ...]:
-        """The twist that leads a body from one pose to another, in parts, as rows of :meth:`tangents`."""
+        """The twist that leads a body from one pose to another, in parts, as rows of :meth:`build_tangents`."""
         if self.observation_model.point is not None and name == self.observation_model.platform:
             return (
                 (transform(X, self.observation_model.point) - transform(home, self.observation_model.point))
                 / self.model.length,
             )
-        return (X[:3, 3] - home[:3, 3]) / self.model.length, logarithm(X[:3, :3] @ home[:3, :3].T)
+        return (X[:3, 3] - home[:3, 3]) / self.model.length, convert_rotations_to_vectors(X[:3, :3] @ home[:3, :3].T)
 
     def links_moved(self, q: Array, places: Sequence[Array]) -> tuple[str, ...]:
         """The links that are elsewhere, or turned, at one of some configurations."""
@@ -259,19 +261,19 @@ class _Follower:
         found = [
             max(
                 (
-                    pose_difference(X, Y, self.model.length)
+                    compare_poses(X, Y, self.model.length)
                     for X, Y in ((self.model.poses(there, (link,))[0], home[k]) for there in places)
                 ),
                 default=0.0,
             )
             for k, link in enumerate(links)
         ]
-        return tuple(link for link, far in zip(links, found, strict=True) if far > SAME_RELATION)
+        return tuple(link for link, far in zip(links, found, strict=True) if far > RELATION_ANGLE_TOL)
 
-    def walk(self, q: Array, w: Array) -> _Followed:
+    def walk(self, q: Array, w: Array) -> _FollowedPath:
         """As far as the motion leads along the bodies' twist w (rows,), and then the other way."""
         places, shift, turn, returns = [q], 0.0, 0.0, False
-        inside, beyond = np.zeros(2), dict.fromkeys(outside(self.model, q))
+        inside, beyond = np.zeros(2), dict.fromkeys(list_joints_beyond(self.model, q))
         home = not beyond
         for sign in (1.0, -1.0):
             before, taken = self._platform(q), list[tuple[Array, bool]]()
@@ -281,17 +283,17 @@ class _Follower:
                 step = np.array(
                     [
                         np.linalg.norm(now[:3, 3] - before[:3, 3]) / self.model.length,
-                        np.linalg.norm(logarithm(now[:3, :3] @ before[:3, :3].T)),
+                        np.linalg.norm(convert_rotations_to_vectors(now[:3, :3] @ before[:3, :3].T)),
                     ]
                 )
                 shift, turn = shift + float(step[0]), turn + float(step[1])
-                beyond |= dict.fromkeys(past := outside(self.model, there))
+                beyond |= dict.fromkeys(past := list_joints_beyond(self.model, there))
                 taken.append((step, not past))
                 along, before = now[:3, 3] - before[:3, 3], now
                 returns = (
                     number > 2
                     and bodies_apart(self.bodies(there), self.bodies(q), self.observation_model, self.model.length)
-                    <= MOTION_STEP / 2
+                    <= SELF_MOTION_STEP_MAX / 2
                 )
                 if returns:
                     left = self._platform(q)[:3, 3] - now[:3, 3]
@@ -301,9 +303,9 @@ class _Follower:
                 inside += sum((step for step, _ in takewhile(lambda each: home and each[1], way)), np.zeros(2))
             if returns:
                 break
-        small = SAME_RELATION * len(places)
+        small = RELATION_ANGLE_TOL * len(places)
         inside[inside <= small] = 0.0
-        return _Followed(
+        return _FollowedPath(
             tuple(places),
             shift if shift > small else 0.0,
             turn if turn > small else 0.0,
@@ -314,14 +316,14 @@ class _Follower:
 
     def steps(self, q: Array, w: Array) -> Iterator[Array]:
         """Closed configurations one step apart, until no step is closed again or the motion ends."""
-        for _ in range(MOTION_STEPS):
+        for _ in range(SELF_MOTION_STEPS_MAX):
             basis, joints = self.tangents(q)
             ahead = basis.T @ w
             size = float(np.linalg.norm(ahead))
-            if size < 1.0 - MOTION_BEND:
+            if size < 1.0 - SELF_MOTION_BEND_TOL:
                 return
             w = basis @ ahead / size
-            step = shorten_step(MOTION_STEP * (joints @ ahead) / size, MOTION_STEP)
+            step = shorten_step(SELF_MOTION_STEP_MAX * (joints @ ahead) / size, SELF_MOTION_STEP_MAX)
             there = self._close(q, step)
             if there is None:
                 return
@@ -330,11 +332,12 @@ class _Follower:
 
     def _close(self, q: Array, step: Array) -> Array | None:
         """The closed configuration beside the end of a step, or of a part of it; None where there is none."""
-        for part in 0.5 ** np.arange(MOTION_HALVINGS):
+        for part in 0.5 ** np.arange(SELF_MOTION_STEP_HALVINGS_MAX):
             predicted = self.model.integrate(q, part * step)
-            there, residual = solve(self.model, predicted, self.held, tolerance=SOLVED, iterations=15)
-            if residual <= CLOSED and (
-                np.linalg.norm(self.model.difference(predicted, there)) <= MOTION_BEND * part * np.linalg.norm(step)
+            there, residual = solve(self.model, predicted, self.held, tolerance=CLOSURE_SOLVER_TOL, iterations=15)
+            if residual <= CLOSURE_RESIDUAL_TOL and (
+                np.linalg.norm(self.model.difference(predicted, there))
+                <= SELF_MOTION_BEND_TOL * part * np.linalg.norm(step)
             ):
                 return there
         return None
@@ -342,15 +345,15 @@ class _Follower:
     def _platform(self, q: Array) -> Array:
         """The platform's pose (4, 4); of a point, without turn."""
         X = self.model.pose(q, self.observation_model.platform)
-        return X if self.observation_model.point is None else pose(transform(X, self.observation_model.point))
+        return X if self.observation_model.point is None else build_pose(transform(X, self.observation_model.point))
 
 
 def bodies_apart(
     one: dict[str, Array], other: dict[str, Array], observation_model: ObservationModel, length: float
 ) -> float:
-    """Return how far bodies are from where they are elsewhere, as :func:`pose_difference`; of a platform that is a
+    """Return how far bodies are from where they are elsewhere, as :func:`compare_poses`; of a platform that is a
     point, the point."""
     return max(
-        pose_difference(X, other[body], length, observation_model.point if body == observation_model.platform else None)
+        compare_poses(X, other[body], length, observation_model.point if body == observation_model.platform else None)
         for body, X in one.items()
     )

@@ -15,27 +15,27 @@ from typing import Any
 
 import numpy as np
 
-from ...constraints.pattern import leg_ends
-from ...errors import SystemNotSolved, UnsupportedLocus
-from ...geometry.vectors import Array, pose_difference
+from ...constraints.pattern import list_leg_ends
+from ...errors import ExternalSolverFailure, UnsupportedLocus
+from ...geometry.vectors import Array, compare_poses
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.tasks import FixedValuesTask
 from ...kinematics.tasks import solve as close
 from ...kinematics.velocity_relation import ObservationModel
 from ...mechanism import Direction
 from ...mechanism.observations.encoder import Encoder
-from ...tolerances import INDEPENDENT_RATES, NUMBER_ROUNDING, SOLVED
+from ...tolerances import CLOSURE_SOLVER_TOL, INDEPENDENT_RATES_MIN, NUMBER_ROUNDING
 from ..measured import MeasuredRobot
 from .branches import Model
 from .carrying_leg import freedoms_of
 from .carrying_leg_modes import as_mode
 from .carrying_leg_system import CarriedPlatform, Turn
 from .leg_conditions import OriginAndUnit
-from .pose_boxes import PRECISION, PoseBox, as_box, zeros
+from .pose_boxes import POSE_BOX_BITS_COUNT, PoseBox, as_box, zeros
 from .solve import SystemMode, SystemModes
 
-LARGEST_CHAIN = 5
-TURN = 0.7
+SINGLE_LOOP_JOINTS_MAX = 5
+MIDDLE_JOINT_OFFSET_RAD = 0.7
 """Rotation of the middle joint (rad), so that none of its angles of interest is a half-turn."""
 
 
@@ -64,7 +64,7 @@ class SingleLoop(CarriedPlatform):
         held = FixedValuesTask.at(
             model, self.goal.q, self.observation_model.reference, self.observation_model.observations
         )
-        found, residual = close(model, model.integrate(self.goal.q, step), held, tolerance=SOLVED)
+        found, residual = close(model, model.integrate(self.goal.q, step), held, tolerance=CLOSURE_SOLVER_TOL)
         return ClosedConfiguration.of(model, found), residual
 
     def axes(self) -> list[Any]:
@@ -107,7 +107,7 @@ def single_loop(measured: MeasuredRobot, goal: ClosedConfiguration, error: float
     """The mechanism as one loop, what is measured held. Raises ``UnsupportedLocus`` where it is none, or what is
     measured does not hold joints one by one."""
     mechanism, seen = goal.model.mechanism, measured.observation_model.observations
-    bodies = leg_ends(measured.setup.decomposition)
+    bodies = list_leg_ends(measured.setup.decomposition)
     ends = [link for joint in mechanism.joints.values() for link in joint.links]
     if (
         mechanism.couplings
@@ -148,7 +148,7 @@ def single_loop(measured: MeasuredRobot, goal: ClosedConfiguration, error: float
             turning = [one for part, _ in side for one in part if not one[0].slides]
             if not turning:
                 break
-            if len(turning) == 1 and np.linalg.norm(np.cross(turning[0][0].axis, d)) > INDEPENDENT_RATES:
+            if len(turning) == 1 and np.linalg.norm(np.cross(turning[0][0].axis, d)) > INDEPENDENT_RATES_MIN:
                 for part, _ in side:
                     part[:] = [one for one in part if one is not turning[0]]
                 break
@@ -156,7 +156,7 @@ def single_loop(measured: MeasuredRobot, goal: ClosedConfiguration, error: float
             raise UnsupportedLocus(mechanism.name, f"the observation at {each.link} locks no joint")
     k = [link for _, link in way].index(bodies[0]) + 1
     chain = [one for part, _ in way for one in part]
-    if not 0 < len(chain) <= LARGEST_CHAIN:
+    if not 0 < len(chain) <= SINGLE_LOOP_JOINTS_MAX:
         raise UnsupportedLocus(mechanism.name, f"its loop has {len(chain)} free joints")
     return SingleLoop(
         (),
@@ -191,7 +191,7 @@ class _Linear:
         """Factors of the first two, conjugate, of the last, and the axis in the middle."""
         h = [self.loop.axes()[k] for k in self.order]
         one = np.array([1, 0, 0, 0, 0, 0, 0, 0], dtype=object)
-        two, rest = h[:2], h[2 + (len(h) == LARGEST_CHAIN) :]
+        two, rest = h[:2], h[2 + (len(h) == SINGLE_LOOP_JOINTS_MAX) :]
         start = [one, -1 * two[0], -1 * two[1], dual_product(two[1], two[0])] if len(two) == 2 else [one, -1 * two[0]]
         end = (
             [one]
@@ -200,19 +200,19 @@ class _Linear:
             if len(rest) == 1
             else [one, rest[0], rest[1], dual_product(rest[0], rest[1])]
         )
-        return start, end, h[2] if len(h) == LARGEST_CHAIN else None
+        return start, end, h[2] if len(h) == SINGLE_LOOP_JOINTS_MAX else None
 
     def matrix(self, t: Any) -> Any:
         """The eight rows, where the middle one's tangent of half an angle, counted from ``TURN``, is t."""
         start, end, h = self.columns()
         if h is not None:
-            c, s = np.cos(TURN), np.sin(TURN)
+            c, s = np.cos(MIDDLE_JOINT_OFFSET_RAD), np.sin(MIDDLE_JOINT_OFFSET_RAD)
             by = np.array([c - s * t if k == 0 else 0 for k in range(8)], dtype=object) + h * (s + c * t)
             end = [dual_product(by, each) for each in end]
         return np.stack([*end, *(-1 * each for each in start)], axis=1)
 
 
-def _regular(rows: Any) -> bool:
+def _has_full_column_rank(rows: Any) -> bool:
     """Return True if columns are independent for all numbers in their balls."""
     from flint import arb_mat
     from scipy.linalg import qr
@@ -287,16 +287,16 @@ def _halves(x: Any) -> list[tuple[Any, Any]]:
 
 
 def solve_loop(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0) -> tuple[Model, SystemModes]:
-    """All modes, with the goal known to ``error`` (m). Raises ``UnsupportedLocus`` and ``SystemNotSolved``."""
+    """All modes, with the goal known to ``error`` (m). Raises ``UnsupportedLocus`` and ``ExternalSolverFailure``."""
     from flint import ctx
 
     if not np.isfinite(error):
         raise UnsupportedLocus(
             measured.setup.robot.name, "the distance to the exact closed configuration is not bounded"
         )
-    loop, (body,) = single_loop(measured, goal, error), leg_ends(measured.setup.decomposition)
-    with ctx.workprec(PRECISION):
-        found = _five(loop) if len(loop.freedoms_) == LARGEST_CHAIN else _few(loop)
+    loop, (body,) = single_loop(measured, goal, error), list_leg_ends(measured.setup.decomposition)
+    with ctx.workprec(POSE_BOX_BITS_COUNT):
+        found = _five(loop) if len(loop.freedoms_) == SINGLE_LOOP_JOINTS_MAX else _few(loop)
     return Model(loop, lambda q: {body: loop.pose(q)}, loop.home, closing=lambda q: loop.close(q)[0]), found
 
 
@@ -316,8 +316,10 @@ def _few(loop: SingleLoop) -> SystemModes:
     from flint import arb
 
     n = len(loop.freedoms_)
-    if not _regular(np.delete(_Linear(loop, 0).matrix(None), 0, axis=1)):  # the goal has c₁ c₂ and the like alone
-        raise SystemNotSolved(
+    if not _has_full_column_rank(
+        np.delete(_Linear(loop, 0).matrix(None), 0, axis=1)
+    ):  # the goal has c₁ c₂ and the like alone
+        raise ExternalSolverFailure(
             "the loop", f"{n} free joints: the linear equations of its products have several solutions"
         )
     box = _box(loop, [(arb(1), arb(0))] * n)
@@ -331,10 +333,10 @@ def _few(loop: SingleLoop) -> SystemModes:
 
 def _five(loop: SingleLoop) -> SystemModes:
     """List five joints: zeros of a determinant in one of them, that which separates most."""
-    found = [each for first in range(LARGEST_CHAIN) if (each := _zeros(_Linear(loop, first))) is not None]
+    found = [each for first in range(SINGLE_LOOP_JOINTS_MAX) if (each := _zeros(_Linear(loop, first))) is not None]
     if not found:
-        raise SystemNotSolved(
-            "the loop", f"{LARGEST_CHAIN} free joints: a determinant does not distinguish its solutions"
+        raise ExternalSolverFailure(
+            "the loop", f"{SINGLE_LOOP_JOINTS_MAX} free joints: a determinant does not distinguish its solutions"
         )
     return min(found, key=lambda each: (not each.complete, max(mode.radius for mode in each.modes)))
 
@@ -350,13 +352,13 @@ def _zeros(linear: _Linear) -> SystemModes | None:
     found = [_box_of_joints(linear, box.box[0]) for box in sure if box.real]
     home = linear.loop.unknowns(linear.loop.home)
     told = [each for each in found if each is not None]
-    at_goal = [each for each in told if each[0].holds(home)]
+    at_goal = [each for each in told if each[0].has_pose(home)]
     if len(told) < len(found) or len(at_goal) != 1:
         return None
     kept = [each for each in told if each is at_goal[0] or not each[1]]
     modes = [_mode(linear.loop, each[0], each is at_goal[0]) for each in kept]
     proof = (
-        f"{LARGEST_CHAIN} free joints of one loop: at most {len(sure)} solutions by the degree of a determinant, "
+        f"{SINGLE_LOOP_JOINTS_MAX} free joints of one loop: at most {len(sure)} solutions by the degree of a determinant, "
         f"{len(sure)} zeros enclosed, all distinct, complex ones too, {len(told)} real"
     )
     out = [as_mode(linear.loop, box, False) for box, excluded in told if (box, excluded) not in kept]
@@ -369,12 +371,12 @@ def _box_of_joints(linear: _Linear, t: Any) -> tuple[PoseBox, bool] | None:
     x = _products(linear, t)
     if x is None:
         return None
-    c, s = np.cos(TURN), np.sin(TURN)
+    c, s = np.cos(MIDDLE_JOINT_OFFSET_RAD), np.sin(MIDDLE_JOINT_OFFSET_RAD)
     last, two = x[:4], x[4:]
     halves = dict(zip(linear.order, [*_halves(two), (c - s * t, s + c * t), *_halves(last)], strict=True))
     if any((a * a + b * b).contains(0) for a, b in halves.values()):
         return None
-    box = _box(linear.loop, [halves[k] for k in range(LARGEST_CHAIN)])
+    box = _box(linear.loop, [halves[k] for k in range(SINGLE_LOOP_JOINTS_MAX)])
     out = any(not (v[0] * v[3] - v[1] * v[2]).contains(0) for v in (last, two))
     return None if box is None else (box, out)
 
@@ -385,5 +387,5 @@ def _mode(loop: SingleLoop, box: PoseBox, goal: bool) -> SystemMode:
         return as_mode(loop, box, True, 0.0)
     mode = as_mode(loop, box, False, np.inf)
     at, residual = loop.close(mode.q)
-    inside = pose_difference(at.pose(loop.body), loop.pose(mode.q), loop.size) <= mode.radius
+    inside = compare_poses(at.pose(loop.body), loop.pose(mode.q), loop.size) <= mode.radius
     return as_mode(loop, box, False, residual) if inside else mode

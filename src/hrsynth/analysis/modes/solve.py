@@ -9,9 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from ...geometry.vectors import Array, frozen
+from ...geometry.vectors import Array, freeze_array
 from ...results import Value
-from ...tolerances import FARTHEST, NEAR_MODE, NEARLY_DOUBLE, SAME_RELATION, TIP_ROUNDING, VANISHES
+from ...tolerances import (
+    DOUBLE_SOLUTION_DISTANCE_TOL,
+    LOCUS_DISTANCE_TOL,
+    NEAR_MODE_DISTANCE_MAX,
+    RELATION_ANGLE_TOL,
+    SOLUTION_DISTANCE_MAX,
+    TIP_ROUNDING,
+)
 from .bounds import Bound, least_bound
 from .constrained_platform import System
 from .loci import Point
@@ -19,25 +26,25 @@ from .modular_root_bound import most_zeros
 from .overdetermined import (
     SnappedPoints,
     dimension,
+    is_beyond_rigid_platform,
     is_excluded,
-    meets,
+    may_be_goal,
     residual,
     snap_centres,
     stationary,
-    torn,
     words,
 )
-from .pose_coordinate_solver import Proposed, by_msolve, enclose_roots, propose_roots, wholes
+from .pose_coordinate_solver import ProposedSolutions, by_msolve, enclose_roots, propose_roots, wholes
 from .quadrics import PoseSystem
-from .roots import RealSolution, SolutionSet, nearly_double, solve_square
+from .roots import RealSolution, SolutionSet, has_nearly_double_solution, solve_square
 from .square_systems import SquareSystem
-from .translating import Translating
+from .translating import TranslatingPlatform
 
-CHOICES = 5
+LEG_CHOICES_SOLVED_MAX = 5
 """Choices of legs that are given to a solver until one has finitely many solutions, and, besides the first, whose
 solutions are starts for near modes."""
 
-CHARTS = 3
+POSE_CHARTS_TRIED_MAX = 3
 """Charts of a rigid body's poses in which solutions are sought until all that are found can be enclosed apart."""
 
 Part = SquareSystem | PoseSystem
@@ -120,11 +127,13 @@ class SystemModes(Value):
     def of_more(cls, modes: Sequence[SystemMode], out: Sequence[SystemMode], proof: str, bound: str) -> SystemModes:
         """Return the modes of a square part with further conditions, all of whose zeros are known: its real zeros
         without those that further conditions exclude (``out``)."""
-        fitting = tuple(mode for mode in modes if mode.proved or mode.residual <= VANISHES)
+        fitting = tuple(mode for mode in modes if mode.proved or mode.residual <= LOCUS_DISTANCE_TOL)
         open_ = len(modes) - len(fitting)
         told = words(True, False, [mode.residual for mode in fitting if not mode.proved], len(out), open_)
         near = tuple(
-            replace(mode, near=True) for mode in (*out, *modes) if mode not in fitting and mode.residual <= NEAR_MODE
+            replace(mode, near=True)
+            for mode in (*out, *modes)
+            if mode not in fitting and mode.residual <= NEAR_MODE_DISTANCE_MAX
         )
         return cls(
             len(fitting),
@@ -164,8 +173,14 @@ def _solve(system: System, near: bool, goal: Array | None) -> SystemModes:
             if not near:
                 return _judge(system, square, roots, None, goal)
             others = (each for each in system.squares() if each.legs != square.legs)
-            return _judge(system, square, roots, ((each, solve_square(each)) for each in islice(others, CHOICES)), goal)
-    if system.surfaces and not isinstance(system, Translating):
+            return _judge(
+                system,
+                square,
+                roots,
+                ((each, solve_square(each)) for each in islice(others, LEG_CHOICES_SOLVED_MAX)),
+                goal,
+            )
+    if system.has_surface_loci and not isinstance(system, TranslatingPlatform):
         return _propose(system, near, goal, propose_roots)
     return _undecided_modes(system, square is not None, goal, near)
 
@@ -174,22 +189,25 @@ def solve_by_msolve(system: System, *, near: bool = True, goal: Array | None = N
     """All modes of a system in the pose's own coordinates, proposed by msolve and enclosed here.
 
     As :func:`solve`, but solutions that coincide are counted once, and near modes are looked for from the solutions of
-    one choice of legs alone. Raises ``MissingExtra``, ``SystemNotSolved``.
+    one choice of legs alone. Raises ``MissingExtra``, ``ExternalSolverFailure``.
     """
     system, told = snap_centres(system)
     return replace(_propose(system, near, goal, lambda part, enough: by_msolve(part)), snapped=told)
 
 
 def _propose(
-    system: System, near: bool, goal: Array | None, proposer: Callable[[PoseSystem, int | None], Proposed | None]
+    system: System,
+    near: bool,
+    goal: Array | None,
+    proposer: Callable[[PoseSystem, int | None], ProposedSolutions | None],
 ) -> SystemModes:
     if system.missing:
         return _too_few(system)
     part = None
-    for part in islice(wholes(system), CHOICES):
+    for part in islice(wholes(system), LEG_CHOICES_SOLVED_MAX):
         most = least_bound(system, part.legs)
         roots = None
-        for number in range(CHARTS):
+        for number in range(POSE_CHARTS_TRIED_MAX):
             part = replace(part, chart=system.chart(number)) if number else part
             found = proposer(part, None if most is None else most.most)
             if found is None:
@@ -281,7 +299,9 @@ def _judge(
             enclosed,
             solved=(SquareSolution(system, square, roots, tuple(found), (True,) * len(found)),),
         )
-    whole = [mode for mode, root in zip(found, roots.real, strict=True) if not _torn(system, square, root)]
+    whole = [
+        mode for mode, root in zip(found, roots.real, strict=True) if not _is_beyond_platform(system, square, root)
+    ]
     at_goal = _goal(system, roots, whole, goal)
     left = [
         mode
@@ -291,14 +311,14 @@ def _judge(
     modes = tuple(
         mode if mode is at_goal else replace(mode, proved=False, match_residual=mode.proved)
         for mode in left
-        if mode is at_goal or mode.residual <= VANISHES
+        if mode is at_goal or mode.residual <= LOCUS_DISTANCE_TOL
     )
     enclosed = roots.complete and len(modes) == len(left) and all(mode.proved or mode.match_residual for mode in modes)
-    open_ = [mode for mode in left if mode is not at_goal and mode.residual > VANISHES]
-    lost = goal is not None and not any(_same(system, mode.q, goal) for mode in left)
-    if goal is not None and not any(_same(system, mode.q, goal) for mode in modes):
+    open_ = [mode for mode in left if mode is not at_goal and mode.residual > LOCUS_DISTANCE_TOL]
+    lost = goal is not None and not any(_is_goal_pose(system, mode.q, goal) for mode in left)
+    if goal is not None and not any(_is_goal_pose(system, mode.q, goal) for mode in modes):
         at_goal = _by_construction(system, goal, square.legs)  # its solution is known too roughly to match
-        modes, open_ = (*modes, at_goal), [mode for mode in open_ if not _same(system, mode.q, goal)]
+        modes, open_ = (*modes, at_goal), [mode for mode in open_ if not _is_goal_pose(system, mode.q, goal)]
         enclosed = False
     near = () if others is None else _near(system, found, modes, others)
     fitting = [mode.residual for mode in modes if mode is not at_goal]
@@ -323,7 +343,14 @@ def _judge(
 def _by_construction(system: System, goal: Array, legs: tuple[int, ...]) -> SystemMode:
     """The goal as a mode whose place no solution proves."""
     return SystemMode(
-        (), np.inf, np.inf, np.pi, system.residual(system.tips_at(goal)), frozen(system.pose(goal)), frozen(goal), legs
+        (),
+        np.inf,
+        np.inf,
+        np.pi,
+        system.residual(system.tips_at(goal)),
+        freeze_array(system.pose(goal)),
+        freeze_array(goal),
+        legs,
     )
 
 
@@ -331,13 +358,13 @@ def _goal(system: System, roots: SolutionSet, found: Sequence[SystemMode], goal:
     """The solution that is the goal: the only one that can be, where all are known."""
     if goal is None or not roots.complete:
         return None
-    able = [mode for mode in found if not mode.proved or meets(system, mode.q, goal, mode.shift, mode.turn)]
+    able = [mode for mode in found if not mode.proved or may_be_goal(system, mode.q, goal, mode.shift, mode.turn)]
     return able[0] if len(able) == 1 and able[0].proved else None
 
 
-def _same(system: System, q: Array, goal: Array) -> bool:
+def _is_goal_pose(system: System, q: Array, goal: Array) -> bool:
     """Return True if a pose is the goal, but for the differences of poses of one relation."""
-    return float(np.abs(system.tips_at(q) - system.tips_at(goal)).max()) <= SAME_RELATION * system.size
+    return float(np.abs(system.tips_at(q) - system.tips_at(goal)).max()) <= RELATION_ANGLE_TOL * system.size
 
 
 def _bound(system: System, part: PoseSystem, most: Bound | None, roots: SolutionSet) -> tuple[str, str]:
@@ -380,15 +407,15 @@ def _mode(system: System, square: Part, root: RealSolution) -> SystemMode:
     else:
         own, apart = (), {k: miss + TIP_ROUNDING * system.size for k, miss in enumerate(root.misses)}
     shift, turn = system.spread(q, apart)
-    sure = _sure(system, root) and bool(np.isfinite(shift))
+    sure = _is_proved_for_input(system, root) and bool(np.isfinite(shift))
     return SystemMode(
         own,
         max(shift / system.size, turn),
         shift,
         turn,
         system.residual(at),
-        frozen(system.pose(q)),
-        frozen(q),
+        freeze_array(system.pose(q)),
+        freeze_array(q),
         square.legs,
         root.multiplicity,
         sure,
@@ -402,25 +429,27 @@ def _points(square: SquareSystem, root: RealSolution) -> list[tuple[Array, float
     return list(zip(points, root.misses, strict=True))
 
 
-def _torn(system: System, square: Part, root: RealSolution) -> bool:
+def _is_beyond_platform(system: System, square: Part, root: RealSolution) -> bool:
     """Return True if the tips of a solution's legs do not fit a rigid platform; unless one is fixed, the square part's
     equations exclude that."""
     return (
         isinstance(square, SquareSystem)
         and system.rigid
-        and _sure(system, root)
+        and _is_proved_for_input(system, root)
         and any(isinstance(system.curves[k], Point) for k in square.legs)
-        and torn(system, system.known_tips(square.legs, _points(square, root)))
+        and is_beyond_rigid_platform(system, system.known_tips(square.legs, _points(square, root)))
     )
 
 
-def _sure(system: System, root: RealSolution) -> bool:
+def _is_proved_for_input(system: System, root: RealSolution) -> bool:
     """Return True if a root's enclosure is proved for all input within its error."""
     return bool(np.isfinite(system.error) and root.unique and root.thick)
 
 
 def _nearly(system: System, q: Array) -> SystemMode:
-    return SystemMode((), np.inf, np.inf, np.pi, residual(system, q), frozen(system.pose(q)), frozen(q), near=True)
+    return SystemMode(
+        (), np.inf, np.inf, np.pi, residual(system, q), freeze_array(system.pose(q)), freeze_array(q), near=True
+    )
 
 
 def _proof(system: System, roots: SolutionSet) -> str:
@@ -430,7 +459,7 @@ def _proof(system: System, roots: SolutionSet) -> str:
     if roots.extraneous:
         text += f" (besides {roots.extraneous} roots at infinity, which are not poses)"
     if roots.far:
-        text += f" (besides {roots.far} beyond {FARTHEST:g} characteristic lengths: at infinity, up to rounding)"
+        text += f" (besides {roots.far} beyond {SOLUTION_DISTANCE_MAX:g} characteristic lengths: at infinity, up to rounding)"
     text += f", {roots.complex} {'root' if roots.complex == 1 else 'roots'} isolated"
     if roots.real:
         thin = sum(root.unique and not root.thick for root in roots.real)
@@ -453,11 +482,11 @@ def _special(roots: SolutionSet) -> str | None:
         return (
             "the solutions of all distances are counted: undecided which of them a snapped geometry sends to infinity"
         )
-    if not nearly_double(roots):
+    if not has_nearly_double_solution(roots):
         return None
     if any(root.multiplicity > 1 for root in roots.real):
         return "a double solution: a singular pose"
     return (
-        f"two solutions differ by only {roots.closest:.1e} (limit for distinct poses: {NEARLY_DOUBLE:g}): "
+        f"two solutions differ by only {roots.closest:.1e} (limit for distinct poses: {DOUBLE_SOLUTION_DISTANCE_TOL:g}): "
         "a singular pose, to rounding"
     )

@@ -8,10 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from ...geometry.vectors import Array, cross, unit
+from ...geometry.vectors import Array, cross, normalise_vector
 from .loci import Circle, Curve, Line, Plane, Sphere, Surface, extent, length
 from .polynomials import Equation
-from .quadrics import UNIT, Conic, Numbers, Rounded, WorkingFrame, conic, direction, on_plane, on_sphere, spatial_frame
+from .quadrics import (
+    UNIT,
+    Conic,
+    Numbers,
+    RoundedConic,
+    WorkingFrame,
+    conic,
+    direction,
+    on_plane,
+    on_sphere,
+    spatial_frame,
+)
 
 TURNS = (0.7, 1.9, 2.6)
 """Origin t = 0 on the circles of the first, second and third unknown (rad): nowhere special."""
@@ -34,12 +45,12 @@ class SquareSystem:
     whole: bool
     exact: Callable[[Numbers], list[Conic]] | None = None
 
-    def conics(self, turn: float = 0.0, numbers: Numbers = Rounded) -> list[Conic]:
+    def conics(self, turn: float = 0.0, numbers: Numbers = RoundedConic) -> list[Conic]:
         """The unknowns' curves, circles counted from ``turn`` on."""
         assert self.frame is not None
         return [conic(curve, self.frame, t, numbers) for curve, t in zip(self.unknowns, self.turns(turn), strict=True)]
 
-    def equations(self, turn: float = 0.0, numbers: Numbers = Rounded) -> list[Equation]:
+    def equations(self, turn: float = 0.0, numbers: Numbers = RoundedConic) -> list[Equation]:
         """The equations with circles counted from ``turn`` on."""
         return [] if self.frame is None else self.build(self.conics(turn, numbers), numbers)
 
@@ -73,13 +84,13 @@ def three_surfaces(legs: Sequence[tuple[int, Surface]], whole: bool) -> tuple[fl
     one, two = (_normal(surface, last) for surface in (first, second))
     along = cross(one, two)
     sine = length(along)
-    d = unit(along) if sine > 0 else np.array([0.0, 0.0, 1.0])
+    d = normalise_vector(along) if sine > 0 else np.array([0.0, 0.0, 1.0])
     offset = frame.origin
     line = Line(_foot((one, two), [_offset(surface, last, offset) for surface in (first, second)], d) + offset, d)
 
     def point(numbers: Numbers) -> Conic:
-        exact = Rounded.vector(frame.R @ d)
-        start = Rounded.vector(np.array([float(d @ (line.centre - frame.origin)) / frame.size]))[0] * UNIT
+        exact = RoundedConic.vector(frame.R @ d)
+        start = RoundedConic.vector(np.array([float(d @ (line.centre - frame.origin)) / frame.size]))[0] * UNIT
         (n, h), (m, k) = (_plane(surface, last, frame, numbers) for surface in (first, second))
         across = np.cross(n, m)
         at, slope = h * np.cross(m, exact) + k * np.cross(exact, n) + start * across, UNIT * UNIT * across

@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from ...geometry.so3 import logarithm, rotation_of
+from ...geometry.so3 import convert_from_quaternion, convert_rotations_to_vectors
 from ...geometry.vectors import Array, cross
 from .loci import Reach
 from .polynomials import Quadric
-from .quadrics import UNIT, Moving, Numbers, PoseParametrization, spatial_frame
+from .quadrics import UNIT, MovingPoint, Numbers, PoseParametrization, spatial_frame
 
-COUNT = 7
+STUDY_UNKNOWNS_COUNT = 7
 """Unknowns: three of the quaternion, four of g."""
 
 
@@ -34,17 +34,17 @@ def study(
     shift, back = 2 * _vector(e, g, 1), 2 * _vector(e, g, -1)
     gg = sum(_product(v, v) for v in g)
 
-    def tips(numbers: Numbers) -> list[Moving]:
+    def tips(numbers: Numbers) -> list[MovingPoint]:
         found = []
         for k, tip in enumerate(b):
             v = numbers.vector(tip / frame.size)
             if k < len(b) - arrows:
                 Q = 4 * UNIT * UNIT * gg + 2 * UNIT * (back @ v) + (v @ v) * w
-                found.append(Moving(UNIT * shift + R @ v, Q, w))
+                found.append(MovingPoint(UNIT * shift + R @ v, Q, w))
             else:
                 o = numbers.vector(frame.point(hub))
                 N = R @ v + np.multiply.outer(w, o)
-                found.append(Moving(N, (v @ v - o @ o) * w + 2 * (N @ o), w))
+                found.append(MovingPoint(N, (v @ v - o @ o) * w + 2 * (N @ o), w))
         return found
 
     def place(x: Sequence[float]) -> Array:
@@ -52,12 +52,12 @@ def study(
         q, t = (ends @ rows.astype(float).T for rows in (e, g))
         norm = float(q @ q)
         p = 2.0 * (q[0] * t[1:] - t[0] * q[1:] + cross(q[1:], t[1:])) / norm
-        turned = frame.R.T @ rotation_of(q / math.sqrt(norm))
-        return np.array([*(frame.origin + frame.size * (p @ frame.R)), *logarithm(turned)])
+        turned = frame.R.T @ convert_from_quaternion(q / math.sqrt(norm))
+        return np.array([*(frame.origin + frame.size * (p @ frame.R)), *convert_rotations_to_vectors(turned)])
 
     normal = sum(_product(u, v) for u, v in zip(e, g, strict=True))
     return PoseParametrization(
-        frame, COUNT, reaches, tips, (normal,), place, Quadric(w), np.vstack([e, g]).astype(float)
+        frame, STUDY_UNKNOWNS_COUNT, reaches, tips, (normal,), place, Quadric(w), np.vstack([e, g]).astype(float)
     )
 
 

@@ -16,14 +16,14 @@ from itertools import combinations
 import numpy as np
 
 from ...constraints.locked_legs import LockedLeg
-from ...constraints.named_vectors import BodyPoint, BodyVector, NamedVector, Tangent, poses_at
+from ...constraints.named_vectors import BodyPoint, BodyVector, NamedVector, Tangent, collect_poses
 from ...constraints.pattern import ConstraintPattern
 from ...errors import UnsupportedLocus
-from ...geometry.ranks import kernel_basis
+from ...geometry.ranks import compute_kernel_basis
 from ...geometry.vectors import Array, transform
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.leg_reach import alone
-from ...kinematics.locked_twists import joint_at, rezero
+from ...kinematics.leg_reach import extract_leg
+from ...kinematics.locked_twists import locate_joint, set_zero
 from ...kinematics.pinocchio_model import PinocchioModel
 from ...kinematics.tasks import FixedValuesTask, solve
 from ...kinematics.velocity_relation import ObservationModel
@@ -31,16 +31,23 @@ from ...mechanism import Observation
 from ...mechanism.composites import WordGraph
 from ...mechanism.legs import LegDecomposition, decompose
 from ...results import Value
-from ...tolerances import CLOSED, FOLLOWED, MOVED, SAME_POINT, SAME_RELATION, SOLVED
+from ...tolerances import (
+    CLOSURE_RESIDUAL_TOL,
+    CLOSURE_SOLVER_TOL,
+    HIDDEN_ROBOT_RESIDUAL_TOL,
+    MOVED_AXIS_LEVER_MAX,
+    POINT_DISTANCE_TOL,
+    RELATION_ANGLE_TOL,
+)
 from .leg_orientations import kept_angle, orientations
 from .loci import Circle, Line, Plane, Point, Reach, Sphere
 from .loci_from_joints import reaches
-from .locked_chain import Chain, LocusNotDerived, chain
+from .locked_chain import Chain, LocusDerivationFailure, chain
 
 MOVES = (-0.4, -0.15, 0.15, 0.4)
 """Distance that a leg is moved along a dof to check its tip's locus (characteristic lengths, radians)."""
 
-MIXED = 4
+MIXED_LEG_MOTIONS_COUNT = 4
 """Number of combinations of its dof along which a leg with several of them is moved too."""
 
 
@@ -115,7 +122,9 @@ def tip_loci(
     name = decomposition.mechanism.name
     if pattern.motion == "other":
         raise UnsupportedLocus(name, "the pattern of its legs is not a known one")
-    if pattern.turning and not any(_turned_once(decomposition, observation_model, leg, goal) for leg in pattern.legs):
+    if pattern.turning and not any(
+        _has_one_orientation(decomposition, observation_model, leg, goal) for leg in pattern.legs
+    ):
         raise UnsupportedLocus(name, "its legs may fix the platform in another rotation")
     plane = None if pattern.plane is None else _value(pattern.plane, goal)
     end = (
@@ -125,7 +134,7 @@ def tip_loci(
         if pattern.motion in ("spatial", "oriented") or decomposition.point is not None
         else "kept"
     )
-    tips = tuple(_tip(decomposition, observation_model, leg, goal, end) for leg in pattern.legs if not leg.free)
+    tips = tuple(_tip(decomposition, observation_model, leg, goal, end) for leg in pattern.legs if not leg.is_tip_free)
     angles = tuple(
         _angle(decomposition, observation_model, leg, goal)
         for leg in pattern.legs
@@ -147,7 +156,7 @@ def _held_chain(
     return chain(decomposition, decomposition.leg(leg.label), own, at, _value(leg.tip, at) * at.model.length, end)
 
 
-def _turned_once(
+def _has_one_orientation(
     decomposition: LegDecomposition, observation_model: ObservationModel, leg: LockedLeg, goal: ClosedConfiguration
 ) -> bool:
     """Return True if the joints of a locked leg leave its end one orientation, that at the goal, for all leg
@@ -156,7 +165,7 @@ def _turned_once(
         return False
     try:
         known = [bodies for bodies, _ in orientations(_held_chain(decomposition, observation_model, leg, goal, "free"))]
-    except LocusNotDerived:
+    except LocusDerivationFailure:
         return False
     return len(known) == 1 and known[0][-1] is not None
 
@@ -168,11 +177,13 @@ def _angle(
     try:
         found = _held_chain(decomposition, observation_model, leg, goal, "free")
         axis, direction = kept_angle(found)
-    except LocusNotDerived as error:
+    except LocusDerivationFailure as error:
         raise UnsupportedLocus(
             decomposition.mechanism.name, f"how leg {leg.label} rotates the platform is not known: {error}"
         ) from None
-    return KeptAngle(leg.label, leg.body, goal.pose(leg.body)[:3, :3].T @ direction, axis, MOVED * found.moved)
+    return KeptAngle(
+        leg.label, leg.body, goal.pose(leg.body)[:3, :3].T @ direction, axis, MOVED_AXIS_LEVER_MAX * found.moved
+    )
 
 
 def _tip(
@@ -192,7 +203,7 @@ def _tip(
 
     try:
         found, moved = branches(goal)
-    except LocusNotDerived as error:
+    except LocusDerivationFailure as error:
         return _fit_tip(
             decomposition,
             own,
@@ -202,11 +213,11 @@ def _tip(
             goal,
         )
     if moved:  # at the zero configuration, unless that is special, the file's own decimals show it
-        with suppress(LocusNotDerived):
+        with suppress(LocusDerivationFailure):
             moved = branches(ClosedConfiguration(goal.model, goal.model.q0, 0.0))[1]
     freedoms = 0 if leg.fixed else 1 if leg.line is not None else 2 if leg.normal is not None else 3
     here = found[0][0]
-    if here.freedoms == freedoms and np.linalg.norm(here.miss(B)) <= FOLLOWED * goal.model.length:
+    if here.freedoms == freedoms and np.linalg.norm(here.miss(B)) <= HIDDEN_ROBOT_RESIDUAL_TOL * goal.model.length:
         return Tip(leg.label, leg.body, place, here, tuple(found[1:]), moved=moved)
     doubt = (
         f"its joints taken one by one leave {here.freedoms} dof, together {freedoms}"
@@ -241,7 +252,7 @@ def _fit_tip(
     worst = np.inf
     for curve in _candidates(decomposition, leg, B, goal):
         miss = max((float(np.linalg.norm(curve.miss(point))) for point in paths), default=0.0) / goal.model.length
-        if miss <= SAME_RELATION:
+        if miss <= RELATION_ANGLE_TOL:
             return replace(tip, curve=curve)
         worst = min(worst, miss)
     what = (
@@ -267,7 +278,7 @@ def _candidates(
         yield from (turning, _opposite(turning, tip))
         axis, on = _value(leg.line.axis, goal), _value(leg.line.start, goal) * goal.model.length
         spoke = tip - on - axis * float(axis @ (tip - on))
-        if np.linalg.norm(spoke) > SAME_POINT * goal.model.length:
+        if np.linalg.norm(spoke) > POINT_DISTANCE_TOL * goal.model.length:
             yield Circle(tip - spoke, axis, float(np.linalg.norm(spoke)), spoke)
     elif leg.normal is not None:
         n = _value(leg.normal, goal)
@@ -279,13 +290,14 @@ def _candidates(
 def _rods(decomposition: LegDecomposition, leg: LockedLeg, along: Array, goal: ClosedConfiguration) -> list[Array]:
     """From joint centre to joint centre (m) of a leg, where that is parallel to a direction."""
     joints = [decomposition.mechanism.joints[name] for name in decomposition.leg(leg.label).joints]
-    centres = [joint_at(goal, joint)[0] * goal.model.length for joint in joints]
+    centres = [locate_joint(goal, joint)[0] * goal.model.length for joint in joints]
     between = [other - one for one, other in combinations(centres, 2)]
-    small = SAME_POINT * goal.model.length
+    small = POINT_DISTANCE_TOL * goal.model.length
     return [
         rod
         for rod in between
-        if np.linalg.norm(rod) > small and np.linalg.norm(np.cross(rod, along)) <= SAME_RELATION * np.linalg.norm(rod)
+        if np.linalg.norm(rod) > small
+        and np.linalg.norm(np.cross(rod, along)) <= RELATION_ANGLE_TOL * np.linalg.norm(rod)
     ]
 
 
@@ -320,7 +332,7 @@ def _slide(
         if len(edge.joints) == 4:
             joints = [decomposition.mechanism.joints[name] for name in edge.joints[:2]]
             near, far = joints if edge.tail == one else joints[::-1]
-            (start, axes), (end, _) = joint_at(goal, near), joint_at(goal, far)
+            (start, axes), (end, _) = locate_joint(goal, near), locate_joint(goal, far)
             spoke = (end - start - axes[0] * float(axes[0] @ (end - start))) * goal.model.length
             return Circle(at - spoke, axes[0], float(np.linalg.norm(spoke)), spoke), None
     assert isinstance(pattern.slide, Tangent)
@@ -328,7 +340,7 @@ def _slide(
     second = _opposite(first, at)
     kernel, _ = goal.kernel()
     step = kernel @ np.linalg.svd(moving @ kernel)[2][0]
-    nearby, _ = solve(goal.model, goal.model.integrate(goal.q, MOVES[-1] * step), tolerance=SOLVED)
+    nearby, _ = solve(goal.model, goal.model.integrate(goal.q, MOVES[-1] * step), tolerance=CLOSURE_SOLVER_TOL)
     there, _ = _apart(pattern, goal, nearby)
     circle = min((first, second), key=lambda circle: float(np.linalg.norm(circle.miss(there))))
     return circle, f"no parallelogram joins {one} and {other}"
@@ -345,25 +357,25 @@ def _held_paths(
 ) -> list[Array]:
     """Return the positions of a tip when its leg alone, with fixed measured values, is moved along each of its dof, and
     along some random combinations of them."""
-    rest = decompose(rezero(goal))
-    model = PinocchioModel(alone(rest, rest.leg(leg.label)), goal.model.length)
+    rest = decompose(set_zero(goal))
+    model = PinocchioModel(extract_leg(rest, rest.leg(leg.label)), goal.model.length)
     held = FixedValuesTask.at(model, model.q0, reference, own)
-    start = ClosedConfiguration.of(model, model.q0, SAME_RELATION)
-    free, _ = kernel_basis(np.vstack([model.jacobian(start.q), held.error_and_jacobian(model, start.q)[1]]))
+    start = ClosedConfiguration.of(model, model.q0, RELATION_ANGLE_TOL)
+    free, _ = compute_kernel_basis(np.vstack([model.jacobian(start.q), held.error_and_jacobian(model, start.q)[1]]))
     found = []
     directions = free.T
     if len(directions) > 1:
-        mixed = np.random.default_rng(0).normal(size=(MIXED, len(directions))) @ directions
+        mixed = np.random.default_rng(0).normal(size=(MIXED_LEG_MOTIONS_COUNT, len(directions))) @ directions
         directions = np.vstack([directions, mixed / np.linalg.norm(mixed, axis=1, keepdims=True)])
     for direction in directions:
         for size in MOVES:
-            q, residual = solve(model, model.integrate(start.q, size * direction), held, tolerance=SOLVED)
+            q, residual = solve(model, model.integrate(start.q, size * direction), held, tolerance=CLOSURE_SOLVER_TOL)
             X = model.pose(q, leg.body)
-            if residual <= CLOSED:
+            if residual <= CLOSURE_RESIDUAL_TOL:
                 found.append(transform(X, place))
     return found
 
 
 def _value(feature: NamedVector | BodyPoint, goal: ClosedConfiguration) -> Array:
-    value: Array = feature.value(poses_at([goal], feature.links))[0]
+    value: Array = feature.value(collect_poses([goal], feature.links))[0]
     return value

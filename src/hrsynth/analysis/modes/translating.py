@@ -12,13 +12,13 @@ import numpy as np
 
 from ...errors import BadRequest
 from ...geometry.vectors import Array, cross
-from ...tolerances import PARALLEL, TIP_ROUNDING, VANISHES
-from .constrained_platform import Shifting
+from ...tolerances import EXACT_PARALLEL_SINE_TOL, LOCUS_DISTANCE_TOL, TIP_ROUNDING
+from .constrained_platform import TranslatingBodies
 from .loci import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, extent, length, shift_reach
 from .polynomials import Equation
 from .quadrics import (
     Conic,
-    Moving,
+    MovingPoint,
     Numbers,
     PoseParametrization,
     direction,
@@ -36,7 +36,7 @@ from .square_systems import SquareSystem, resting, single, three_surfaces
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Translating(Shifting):
+class TranslatingPlatform(TranslatingBodies):
     """A platform that only translates: q = p, shape (3,). ``tips`` has shape (n, 3).
 
     The locus of each tip, moved by −b_i, contains the point p. Two curves of one plane meet as often as their degrees
@@ -65,7 +65,7 @@ class Translating(Shifting):
         """The position."""
         frame = spatial_frame(self.paths, self.size)
 
-        def tips(numbers: Numbers) -> list[Moving]:
+        def tips(numbers: Numbers) -> list[MovingPoint]:
             return [shifting(3, numbers.vector(np.zeros(3)))] * len(self.paths)
 
         return PoseParametrization(
@@ -81,11 +81,13 @@ class Translating(Shifting):
             if isinstance(path, Point):
                 yield resting((k,), path.centre, len(self.paths) == 1)
         moving = [k for k, path in curves.items() if not isinstance(path, Point)]
-        pairs = sorted(combinations(moving, 2), key=lambda two: not coplanar(curves[two[0]], curves[two[1]], self.size))
+        pairs = sorted(
+            combinations(moving, 2), key=lambda two: not is_coplanar(curves[two[0]], curves[two[1]], self.size)
+        )
         for i, j in pairs:
             if isinstance(curves[j], Line) and isinstance(curves[i], Circle):
                 i, j = j, i
-            flat = isinstance(curves[j], Circle) and coplanar(curves[i], curves[j], self.size)
+            flat = isinstance(curves[j], Circle) and is_coplanar(curves[i], curves[j], self.size)
             whole = len(self.curves) == 2 and flat
             yield self._on_curve((i, j), curves[i], curves[j], whole)
         for i in moving:
@@ -104,7 +106,7 @@ class Translating(Shifting):
 
         def build(conics: Sequence[Conic], numbers: Numbers) -> list[Equation]:
             centre = numbers.vector(frame.point(other.centre))
-            if isinstance(other, Sphere) or (isinstance(other, Circle) and coplanar(one, other, self.size)):
+            if isinstance(other, Sphere) or (isinstance(other, Circle) and is_coplanar(one, other, self.size)):
                 rho = numbers.vector(np.array([other.radius / frame.size]))[0]
                 return [single(on_sphere(conics[0], centre, rho * rho))]
             normal = direction(met_normal(one, other), frame, numbers)
@@ -124,20 +126,20 @@ def met_normal(one: Curve, other: Reach) -> Array:
     return n / size if size > 0 else n
 
 
-def coplanar(one: Curve, other: Curve, size: float) -> bool:
+def is_coplanar(one: Curve, other: Curve, size: float) -> bool:
     """Return True if two curves lie in one plane, to ``VANISHES``."""
     between = (other.centre - one.centre) / size
     circles = [curve for curve in (one, other) if isinstance(curve, Circle)]
     lines = [curve.direction for curve in (one, other) if isinstance(curve, Line)]
     if not circles:
-        return abs(float(cross(lines[0], lines[1]) @ between)) < VANISHES
+        return abs(float(cross(lines[0], lines[1]) @ between)) < LOCUS_DISTANCE_TOL
     n = circles[0].axis
     tilt = [length(cross(n, circle.axis)) for circle in circles[1:]] + [float(n @ d) for d in lines]
-    return all(abs(value) < VANISHES for value in [*tilt, float(n @ between)])
+    return all(abs(value) < LOCUS_DISTANCE_TOL for value in [*tilt, float(n @ between)])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Articulated(Shifting):
+class ArticulatedPlatform(TranslatingBodies):
     """Two bodies that translate: q = (p, θ), p (3,) the first body's origin, θ where the second is on ``slide``, a
     circle about it or (s for θ, in metres) a line.
 
@@ -193,7 +195,7 @@ class Articulated(Shifting):
 
         count = 5 if isinstance(self.slide, Circle) else 4
 
-        def tips(numbers: Numbers) -> list[Moving]:
+        def tips(numbers: Numbers) -> list[MovingPoint]:
             centre = numbers.vector(frame.vector(self.slide.centre))
             along = (
                 spokes(self.slide, frame, 0.0, numbers)
@@ -214,16 +216,16 @@ class Articulated(Shifting):
         curves = [(k, path) for k, path in enumerate(self.paths) if not isinstance(path, Surface)]
         one, two = ([each for each in curves if self.bodies[each[0]] == body] for body in (0, 1))
         roles = [roles for i in one for j in two for roles in ((i, j), (j, i))]
-        for first, onto in sorted(roles, key=lambda roles: self._along_slide(roles[1][1])):
+        for first, onto in sorted(roles, key=lambda roles: self._is_parallel_to_slider(roles[1][1])):
             if not isinstance(onto[1], Point):
                 yield self._square((first[0], onto[0]), first[1], onto[1])
 
-    def _along_slide(self, curve: Curve) -> bool:
+    def _is_parallel_to_slider(self, curve: Curve) -> bool:
         """Return True if a circle lies in a plane parallel to the slide's."""
         return (
             isinstance(curve, Circle)
             and isinstance(self.slide, Circle)
-            and length(cross(curve.axis, self.slide.axis)) < PARALLEL
+            and length(cross(curve.axis, self.slide.axis)) < EXACT_PARALLEL_SINE_TOL
         )
 
     def _square(self, legs: tuple[int, int], first: Curve, onto: Line | Circle) -> SquareSystem:

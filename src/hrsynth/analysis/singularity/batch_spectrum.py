@@ -11,13 +11,13 @@ from ...batch.configuration_builder import ConfigurationBuilder
 from ...errors import Disagreement
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.velocity_relation import ObservationModel, relation
+from ...kinematics.velocity_relation import ObservationModel, compute_relation
 from ...mechanism.observations.direction import Direction
-from ...tolerances import SAME_RELATION
-from ..singularity_indices import interaction_matrix
+from ...tolerances import RELATION_ANGLE_TOL
+from ..singularity_indices import compute_interaction_matrix
 
 Spectrum = Callable[[Sequence[ClosedConfiguration], ObservationModel], tuple[Array, Array]]
-SPOTS = 10
+SPECTRUM_CHECKED_POSES_COUNT = 10
 """Number of configurations of each sweep at which the batch is compared with Pinocchio."""
 
 
@@ -50,12 +50,12 @@ class Quick:
         found = self.placer.batch.evaluate(X[:, 0], [o.leg for o in self.observation_model.observations])
         u = np.stack([X[:, i, :3, :3] @ o.direction for i, o in enumerate(seen, 1)], axis=1)
         away = np.where(found.reached, np.max(np.abs(u - found.directions), axis=(1, 2)), np.inf)
-        same = away <= SAME_RELATION
+        same = away <= RELATION_ANGLE_TOL
         d = found.interaction_matrix.shape[2]
         values = np.zeros((len(X), d))
         values[:, : found.singular_values.shape[1]] = found.singular_values
         here = np.flatnonzero(same)
-        for i in np.random.default_rng(seed).choice(here, min(SPOTS, len(here)), replace=False):
+        for i in np.random.default_rng(seed).choice(here, min(SPECTRUM_CHECKED_POSES_COUNT, len(here)), replace=False):
             self._check(configurations[int(i)], values[i])
         smallest, largest = values[:, -1].copy(), values[:, 0].copy()
         if not same.all():
@@ -64,13 +64,13 @@ class Quick:
         return smallest, largest
 
     def _check(self, at: ClosedConfiguration, values: Array) -> None:
-        theirs = relation(at, self.observation_model)
-        M = interaction_matrix(theirs)
+        theirs = compute_relation(at, self.observation_model)
+        M = compute_interaction_matrix(theirs)
         if M is None or theirs.dof.value != len(values):
             return
         expected = np.zeros(len(values))
         found = np.linalg.svd(M, compute_uv=False)
         expected[: len(found)] = found
         apart = float(np.max(np.abs(expected - values)))
-        if apart > SAME_RELATION * max(1.0, float(values[0])):
+        if apart > RELATION_ANGLE_TOL * max(1.0, float(values[0])):
             raise Disagreement(self.placer.model.mechanism.name, 1, apart)

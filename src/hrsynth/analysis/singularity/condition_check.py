@@ -14,27 +14,36 @@ from typing import Annotated
 import numpy as np
 
 from ...batch.configuration_builder import ConfigurationBuilder
-from ...budgets import RANK_DESCENTS, WEAKEST_STARTS
-from ...constraints.condition import Condition, Named
+from ...budgets import RANK_DESCENTS, WEAKEST_POSE_STARTS_COUNT
+from ...constraints.condition import Condition, NamedCondition
 from ...constraints.pattern import ConstraintPattern, PatternValues
 from ...errors import Disagreement, UndefinedValue
-from ...geometry.ranks import kernel_basis
+from ...geometry.ranks import compute_kernel_basis
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.velocity_relation import ObservationModel, platform_motions, relation
-from ...kinematics.walking import WEAKEST, random_walk
+from ...kinematics.velocity_relation import ObservationModel, compute_platform_motions, compute_relation
+from ...kinematics.walking import WALK_SINGULAR_VALUE_MIN_FRACTION, walk_randomly
 from ...mechanism.cameras import CameraObservation
 from ...progress import report
 from ...records import As, Number, Recorded, Shown
 from ...results import Value
-from ...tolerances import CLOSED, FOLLOWED, INVERTED, NUDGE, RANK_CUTOFF, RANK_GAP, SAME_RELATION, SAME_SPOT
-from .batch_spectrum import SPOTS, Quick
-from .rank_descent import lose, rates_of_twists, step_from
+from ...tolerances import (
+    CLOSURE_RESIDUAL_TOL,
+    HIDDEN_ROBOT_RESIDUAL_TOL,
+    PSEUDOINVERSE_CUTOFF_FRACTION,
+    RANK_CUTOFF_FRACTION,
+    RANK_GAP_MIN,
+    RELATION_ANGLE_TOL,
+    SINGULAR_POSE_DISTANCE_TOL,
+    SLOPE_STEP_MAX,
+)
+from .batch_spectrum import SPECTRUM_CHECKED_POSES_COUNT, Quick
+from .rank_descent import compute_twist_rates, descend_to_rank_loss, step_from
 
-CHUNK = 250
-ON_LOCUS = 10
+CONDITION_CHECK_CHUNK_COUNT = 250
+LOCUS_POSES_COUNT = 10
 """Poses on the locus that are constructed, where there are so many."""
-TRIES = 4
+LOCUS_SEARCH_STARTS_COUNT = 4
 """Number of poses nearest a singularity from which the locus is searched, if the expression has no sign across it, or
 none was found."""
 
@@ -61,7 +70,7 @@ class Agreement(Value):
     on_locus_record = Shown(int, lambda self: len(self.on_locus), As("on_locus"))
 
 
-def agreement(
+def compare_condition(
     start: ClosedConfiguration,
     observation_model: ObservationModel,
     pattern: ConstraintPattern,
@@ -84,24 +93,28 @@ def agreement(
     low: list[tuple[float, ClosedConfiguration]] = []
     parts: list[tuple[float, ClosedConfiguration]] = []
     quick = Quick.of(placer, observation_model)
-    walks = random_walk(start, count, seed) if quick is None else quick.placer.random_walk(count, seed)
-    for number, drawn in enumerate(_chunks(walks)):
-        chunk = _measurable(drawn, observation_model)
+    walks = walk_randomly(start, count, seed) if quick is None else quick.placer.random_walk(count, seed)
+    for number, drawn in enumerate(_split_chunks(walks)):
+        chunk = _select_measurable(drawn, observation_model)
         if not chunk:
             continue
         here = pattern.values_at(chunk)
         if quick is None:
-            ranks, apart = _weakest(here, observation_model, condition)
+            ranks, apart = _verify_smallest_values(here, observation_model, condition)
         else:
-            ranks, _ = quick.spectrum(chunk, spectrum, seed + number)
-            apart = _weakest(pattern.values_at(chunk[:: CHUNK // SPOTS]), observation_model, condition)[1]
+            ranks, _ = quick.spectrum(chunk, compute_spectrum, seed + number)
+            apart = _verify_smallest_values(
+                pattern.values_at(chunk[:: CONDITION_CHECK_CHUNK_COUNT // SPECTRUM_CHECKED_POSES_COUNT]),
+                observation_model,
+                condition,
+            )[1]
         matrices = condition.rows(here)
         spectra, values = np.linalg.svd(matrices, compute_uv=False), condition.evaluate(here)
         rows, others = spectra[:, -1].astype(float), spectra[:, :-1].prod(axis=1)
         angle = max(angle, apart)
         smallest = min(smallest, float(ranks.min()))
         # the expression is of the size of all singular values' product
-        scaled: Array = np.abs(values) / np.clip(others, INVERTED, 1.0)
+        scaled: Array = np.abs(values) / np.clip(others, PSEUDOINVERSE_CUTOFF_FRACTION, 1.0)
         wrong += int(np.sum(_differ(ranks, rows, scaled)))
         positive, negative = positive + int(np.sum(values > 0)), negative + int(np.sum(values < 0))
         met += len(chunk)
@@ -109,64 +122,70 @@ def agreement(
             walk += chunk
             signs += list(np.sign(values))
             sizes += zip(np.abs(values), spectra.prod(axis=1), strict=True)
-        low = sorted([*low, *zip(ranks.tolist(), chunk, strict=True)], key=_size)[:TRIES]
-        parts.append(min(zip(ranks.tolist(), chunk, strict=True), key=_size))
+        low = sorted([*low, *zip(ranks.tolist(), chunk, strict=True)], key=_measure_pair)[:LOCUS_SEARCH_STARTS_COUNT]
+        parts.append(min(zip(ranks.tolist(), chunk, strict=True), key=_measure_pair))
         report("random poses")
     on_locus: list[ClosedConfiguration] = []
     if all(leg.tip.link == leg.body for leg in pattern.legs):
-        wrong += _out_of_proportion(np.array(sizes))
-    loops = WEAKEST * start.kernel()[1].weakest
-    freedoms = max(relation(at, observation_model).dof.value for at in [start, *(at for _, at in low)])
-    others = [pair for pair in sorted(parts, key=_size) if all(pair[1] is not at for _, at in low)][:WEAKEST_STARTS]
+        wrong += _count_disproportionate(np.array(sizes))
+    loops = WALK_SINGULAR_VALUE_MIN_FRACTION * start.kernel()[1].weakest
+    freedoms = max(compute_relation(at, observation_model).dof.value for at in [start, *(at for _, at in low)])
+    others = [pair for pair in sorted(parts, key=_measure_pair) if all(pair[1] is not at for _, at in low)][
+        :WEAKEST_POSE_STARTS_COUNT
+    ]
     searches = 0
     for starts in (
         []
         if condition.never
         else [
-            _crossings(walk, signs, pattern, condition),
-            _descents(low, observation_model, pattern, condition),
-            _descents(others, observation_model, pattern, condition),
+            _find_crossings(walk, signs, pattern, condition),
+            _search_zeros(low, observation_model, pattern, condition),
+            _search_zeros(others, observation_model, pattern, condition),
         ]
     ):
         for at in starts:
             searches += 1
             if (
                 at is None
-                or _beside(at, observation_model, loops, freedoms)
+                or _is_undecided_place(at, observation_model, loops, freedoms)
                 or _is_known(at, on_locus, observation_model)
             ):
                 continue
-            sigma = float(_weakest(pattern.values_at([at]), observation_model, condition)[0][0])
-            if sigma > RANK_CUTOFF:
+            sigma = float(_verify_smallest_values(pattern.values_at([at]), observation_model, condition)[0][0])
+            if sigma > RANK_CUTOFF_FRACTION:
                 wrong += 1
             on_locus.append(at)
-            if len(on_locus) == ON_LOCUS:
+            if len(on_locus) == LOCUS_POSES_COUNT:
                 break
         if on_locus:
             break
     report("poses nearest a singularity")
     for _, weak in [*low, *others][:RANK_DESCENTS]:
-        at = lose(weak, observation_model)
-        if at is not None and not _beside(at, observation_model, loops, freedoms):
+        at = descend_to_rank_loss(weak, observation_model)
+        if at is not None and not _is_undecided_place(at, observation_model, loops, freedoms):
             wrong += _is_missed(at, observation_model, pattern, condition)
     found = Agreement(met, wrong, angle, smallest, (positive, negative), tuple(on_locus), searches)
-    if wrong or angle > RANK_CUTOFF * RANK_GAP:
+    if wrong or angle > RANK_CUTOFF_FRACTION * RANK_GAP_MIN:
         raise Disagreement(start.model.mechanism.name, wrong, angle)
     return found
 
 
-def weakest(at: ClosedConfiguration, observation_model: ObservationModel) -> float:
+def compute_smallest_value(at: ClosedConfiguration, observation_model: ObservationModel) -> float:
     """The smallest singular value of Mᵀ on an orthonormal basis of the platform's twists (characteristic lengths)."""
-    return float(_relations([at], observation_model)[0][0])
+    return float(_compute_relations([at], observation_model)[0][0])
 
 
-def spectrum(configurations: Sequence[ClosedConfiguration], observation_model: ObservationModel) -> tuple[Array, Array]:
+def compute_spectrum(
+    configurations: Sequence[ClosedConfiguration], observation_model: ObservationModel
+) -> tuple[Array, Array]:
     """The smallest and the largest singular value of Mᵀ at each configuration, (n,) each (characteristic lengths)."""
-    smallest, parts = _relations(configurations, observation_model)
+    smallest, parts = _compute_relations(configurations, observation_model)
     return smallest, np.array([part[2] for part in parts])
 
 
-def _measurable(chunk: list[ClosedConfiguration], observation_model: ObservationModel) -> list[ClosedConfiguration]:
+def _select_measurable(
+    chunk: list[ClosedConfiguration], observation_model: ObservationModel
+) -> list[ClosedConfiguration]:
     """Return those at which everything has a value: no camera is within a cylinder."""
     if not any(isinstance(o, CameraObservation) and o.radius is not None for o in observation_model.observations):
         return chunk
@@ -181,12 +200,14 @@ def _has_values(at: ClosedConfiguration, observation_model: ObservationModel) ->
     return True
 
 
-def _beside(at: ClosedConfiguration, observation_model: ObservationModel, loops: float, freedoms: int) -> bool:
+def _is_undecided_place(
+    at: ClosedConfiguration, observation_model: ObservationModel, loops: float, freedoms: int
+) -> bool:
     """Return True if no rank is certain at a configuration, or the platform itself has fewer dof there."""
     return (
         not _has_values(at, observation_model)
         or at.kernel()[1].weakest < loops
-        or relation(at, observation_model).dof.value < freedoms
+        or compute_relation(at, observation_model).dof.value < freedoms
     )
 
 
@@ -198,29 +219,29 @@ def _is_missed(
         rows = condition.rows(pattern.values_at([at]))
     except UndefinedValue:
         return False
-    return bool(_differ(_relations([at], observation_model)[0], smallest_of(rows))[0])
+    return bool(_differ(_compute_relations([at], observation_model)[0], compute_smallest_values(rows))[0])
 
 
-def smallest_of(rows: Array) -> Array:
+def compute_smallest_values(rows: Array) -> Array:
     """The smallest singular value of each of many matrices, (n,)."""
     return np.asarray(np.linalg.svd(rows, compute_uv=False)[:, -1], dtype=float)
 
 
-def _out_of_proportion(sizes: Array) -> int:
+def _count_disproportionate(sizes: Array) -> int:
     """Return the number of poses at which a signed expression is not the same multiple of the rows' volume as
     elsewhere; for tips that are fixed in the platform."""
     if len(sizes) == 0:
         return 0
     values, volumes = sizes.T
     factor = float(values.sum() / volumes.sum()) if volumes.sum() > 0 else 0.0
-    return int(np.sum(np.abs(values - factor * volumes) > SAME_RELATION * values.max()))
+    return int(np.sum(np.abs(values - factor * volumes) > RELATION_ANGLE_TOL * values.max()))
 
 
-def _chunks(configurations: Iterator[ClosedConfiguration]) -> Iterator[list[ClosedConfiguration]]:
+def _split_chunks(configurations: Iterator[ClosedConfiguration]) -> Iterator[list[ClosedConfiguration]]:
     chunk: list[ClosedConfiguration] = []
     for at in configurations:
         chunk.append(at)
-        if len(chunk) == CHUNK:
+        if len(chunk) == CONDITION_CHECK_CHUNK_COUNT:
             yield chunk
             chunk = []
     if chunk:
@@ -230,39 +251,41 @@ def _chunks(configurations: Iterator[ClosedConfiguration]) -> Iterator[list[Clos
 def _differ(*measures: Array) -> Array:
     """Mask of the poses at which one measure is zero and another is clearly not."""
     table = np.array(measures)
-    return (table.min(axis=0) < RANK_CUTOFF) & (table.max(axis=0) > RANK_CUTOFF * RANK_GAP)
+    return (table.min(axis=0) < RANK_CUTOFF_FRACTION) & (table.max(axis=0) > RANK_CUTOFF_FRACTION * RANK_GAP_MIN)
 
 
-def _relations(
+def _compute_relations(
     chunk: Sequence[ClosedConfiguration], observation_model: ObservationModel, bodies: tuple[str, ...] = ()
 ) -> tuple[Array, list[tuple[Array, Array, float]]]:
     """Smallest singular value of Mᵀ at each configuration; for each the measured rates and the twists of ``bodies`` for
     a basis of the platform's motions, (m, k) and (6 bodies, k), and the largest singular value."""
     sigma, parts = [], []
     for at in chunk:
-        found = relation(at, replace(observation_model, bodies=bodies))
-        M, _ = rates_of_twists(found)
+        found = compute_relation(at, replace(observation_model, bodies=bodies))
+        M, _ = compute_twist_rates(found)
         values = np.linalg.svd(M, compute_uv=False) if M.shape[1] else np.zeros(1)
         sigma.append(float(values[-1]) if M.shape[1] <= len(M) else 0.0)
         parts.append((rates := found.rates, found.basis[found.twist_rows + len(rates) :], float(values[0])))
     return np.array(sigma), parts
 
 
-def _weakest(here: PatternValues, observation_model: ObservationModel, condition: Condition) -> tuple[Array, float]:
+def _verify_smallest_values(
+    here: PatternValues, observation_model: ObservationModel, condition: Condition
+) -> tuple[Array, float]:
     """Smallest singular values by Pinocchio, and the largest angle between the motions that a locked leg allows by its
     named vectors and by Pinocchio."""
-    named = isinstance(condition, Named)
-    sigma, parts = _relations(here.configurations, observation_model, here.pattern.bodies if named else ())
+    named = isinstance(condition, NamedCondition)
+    sigma, parts = _compute_relations(here.configurations, observation_model, here.pattern.bodies if named else ())
     labels = np.repeat([o.leg for o in observation_model.observations], observation_model.sizes)
     angle = 0.0
     for leg in here.pattern.legs if named else ():
         for (rates, twists, _), block in zip(parts, here.allowances(leg), strict=True):
-            held, _ = kernel_basis(rates[np.isin(labels, leg.held_by)], 1.0)
+            held, _ = compute_kernel_basis(rates[np.isin(labels, leg.held_by)], 1.0)
             angle = max(angle, float(np.linalg.norm(block @ twists @ held, 2)))
     return sigma, angle
 
 
-def _crossings(
+def _find_crossings(
     walk: Sequence[ClosedConfiguration], signs: Sequence[float], pattern: ConstraintPattern, condition: Condition
 ) -> Iterator[ClosedConfiguration | None]:
     """Zeros of the expression between neighbours of a walk at which it has different signs, None where one is not
@@ -287,9 +310,13 @@ def _crossings(
             yield None
             continue
         root = there(float(brentq(value, 0.0, 1.0, xtol=1e-15, rtol=1e-14)))
-        if root.residual <= CLOSED:
+        if root.residual <= CLOSURE_RESIDUAL_TOL:
             found = _sharpen(ClosedConfiguration.of(model, root.q), step, pattern, condition)
-            yield found if abs(float(condition.evaluate(pattern.values_at([found]))[0])) <= FOLLOWED else None
+            yield (
+                found
+                if abs(float(condition.evaluate(pattern.values_at([found]))[0])) <= HIDDEN_ROBOT_RESIDUAL_TOL
+                else None
+            )
 
 
 def _sharpen(
@@ -304,13 +331,13 @@ def _sharpen(
         q = at.model.integrate(at.q, size * motion)
         return float(condition.evaluate(pattern.values_at([ClosedConfiguration(at.model, q, at.residual)]))[0])
 
-    here, slope = value(0.0), (value(NUDGE) - value(-NUDGE)) / (2 * NUDGE)
-    if slope == 0.0 or abs(here / slope) > NUDGE:
+    here, slope = value(0.0), (value(SLOPE_STEP_MAX) - value(-SLOPE_STEP_MAX)) / (2 * SLOPE_STEP_MAX)
+    if slope == 0.0 or abs(here / slope) > SLOPE_STEP_MAX:
         return at
     return ClosedConfiguration.of(at.model, at.model.integrate(at.q, -here / slope * motion))
 
 
-def _descents(
+def _search_zeros(
     low: Sequence[tuple[float, ClosedConfiguration]],
     observation_model: ObservationModel,
     pattern: ConstraintPattern,
@@ -322,7 +349,7 @@ def _descents(
         yield descend(start, observation_model, pattern, condition)
 
 
-def _size(pair: tuple[float, ClosedConfiguration]) -> float:
+def _measure_pair(pair: tuple[float, ClosedConfiguration]) -> float:
     return pair[0]
 
 
@@ -331,7 +358,9 @@ def _is_known(
 ) -> bool:
     """Return True if a configuration's platform pose is one of others'."""
     X = at.pose(observation_model.platform)
-    return any(np.linalg.norm(X - other.pose(observation_model.platform)) <= SAME_SPOT for other in others)
+    return any(
+        np.linalg.norm(X - other.pose(observation_model.platform)) <= SINGULAR_POSE_DISTANCE_TOL for other in others
+    )
 
 
 def descend(
@@ -343,7 +372,7 @@ def descend(
 
     here = start
     for _ in range(4):
-        motion = platform_motions(here, observation_model)
+        motion = compute_platform_motions(here, observation_model)
         count = motion.shape[1]
         start_rows = condition.rows(pattern.values_at([here]))[0]
         shape, x0 = start_rows.shape, np.linalg.svd(start_rows)[2][-1]
@@ -363,7 +392,7 @@ def descend(
                 rows = condition.rows(pattern.values_at([at]))[0]
             except UndefinedValue:
                 return np.ones(shape[0] + 1)
-            if at.residual > CLOSED or rows.shape[1] != len(x):
+            if at.residual > CLOSURE_RESIDUAL_TOL or rows.shape[1] != len(x):
                 return np.ones(shape[0] + 1)
             return np.append(rows @ x, x @ x - 1.0)
 
@@ -378,9 +407,9 @@ def descend(
             max_nfev=60,
         )
         there = reached(fit.x[:count])
-        if there.residual > CLOSED:
+        if there.residual > CLOSURE_RESIDUAL_TOL:
             return None
         here = ClosedConfiguration.of(there.model, there.q)
-        if np.linalg.norm(fit.fun) < FOLLOWED:
+        if np.linalg.norm(fit.fun) < HIDDEN_ROBOT_RESIDUAL_TOL:
             return here
     return None

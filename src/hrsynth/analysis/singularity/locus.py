@@ -11,30 +11,30 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from ...batch.pose_continuation import grid_dependence, reach, sweep
-from ...budgets import CLOSER, COARSE_GRID, LOCUS_SIDES
-from ...errors import BadRequest, NoReachablePose, PoseNotReached
+from ...batch.pose_continuation import explain_grid_dependence, sweep, track_to_pose
+from ...budgets import BOUNDARY_REFINEMENT_COUNT, COARSE_GRID_SIDE_COUNT, LOCUS_SIDES
+from ...errors import BadRequest, NoReachablePose, PoseReachFailure
 from ...geometry.so3 import turn_about
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.velocity_relation import ObservationModel
 from ...mechanism import Mechanism
-from ...mechanism.pose import Grid, Pose, as_pose
+from ...mechanism.pose import Grid, Pose, convert_to_pose
 from ...progress import report
 from ...records import As, Number, Recorded, Shown, recorded
 from ...results import Value
-from ...tolerances import ON_PLANE, SAME_RELATION, SAME_SPOT
+from ...tolerances import ON_PLANE, RELATION_ANGLE_TOL, SINGULAR_POSE_DISTANCE_TOL
 from ..measured import MeasuredRobot
 from ..observed import CameraLike, ObservedRobot, SeeLike
 from .batch_spectrum import Quick
-from .condition_check import descend, spectrum, weakest
+from .condition_check import compute_smallest_value, compute_spectrum, descend
 from .rank_curve import PlaneOfPoses
 
-STARTS = 8
+ISOLATED_POSE_STARTS_COUNT = 8
 """Valleys of the smallest singular value from which an isolated singular pose is sought."""
 
-STEPS = 51
+PLANE_SIDE_POSES_COUNT = 51
 """Poses a side of a drawn plane."""
 
 
@@ -73,14 +73,14 @@ class Locus(Value):
     fixed = Shown(Pose, lambda self: self.grid.fixed)
 
 
-def locus(
+def compute_locus(
     robot: Mechanism | ObservedRobot,
     observe: Sequence[str] | str | None = None,
     camera: CameraLike = None,
     *,
     sensor: SeeLike = None,
     plane: Pose | str | None = None,
-    steps: int = STEPS,
+    steps: int = PLANE_SIDE_POSES_COUNT,
     seed: int = 0,
 ) -> Locus:
     """Singularity loci of the hidden and the real robot (with its motors) over a plane of poses.
@@ -89,23 +89,26 @@ def locus(
     (``BadRequest``). Raises ``NoReachablePose`` if no pose of the plane is reached.
     """
     setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed)
-    hidden = _controllable(setup)
+    hidden = _require_controllable(setup)
     real = None
-    if any(joint.actuated for joint in setup.mechanism.joints.values()):
+    if any(joint.is_actuated for joint in setup.mechanism.joints.values()):
         driven = MeasuredRobot.of_motors(setup)
         real = driven if driven.rank == setup.dof else None
-    return _locus(hidden, real, None if plane is None else as_pose(plane), steps)
+    return _compute_both_loci(hidden, real, None if plane is None else convert_to_pose(plane), steps)
 
 
 def require_plane(setup: ObservedRobot, plane: Pose | str | None) -> None:
     """Raise what ``locus`` would raise of the robot or of the plane: before long work, not after it."""
-    hidden = _controllable(setup)
-    _begin_plane(
-        setup.all_samples.start, hidden.observation_model, setup.motion, None if plane is None else as_pose(plane)
+    hidden = _require_controllable(setup)
+    _start_plane(
+        setup.all_samples.start,
+        hidden.observation_model,
+        setup.motion,
+        None if plane is None else convert_to_pose(plane),
     )
 
 
-def _controllable(setup: ObservedRobot) -> MeasuredRobot:
+def _require_controllable(setup: ObservedRobot) -> MeasuredRobot:
     """The hidden robot; raises ``BadRequest`` where it has no locus."""
     hidden = MeasuredRobot.of_directions(setup)
     if hidden.verdict.rank < setup.dof:
@@ -116,7 +119,7 @@ def _controllable(setup: ObservedRobot) -> MeasuredRobot:
     return hidden
 
 
-def _locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None, steps: int) -> Locus:
+def _compute_both_loci(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None, steps: int) -> Locus:
     """Both robots over the plane that ``plane`` fixes (default: of three parts the third as at the zero configuration).
 
     Raises ``NoReachablePose`` where no pose of it is reached, ``BadRequest`` where it does not leave two parts free.
@@ -127,14 +130,14 @@ def _locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None
     def met(first: ClosedConfiguration, coarse: Grid) -> NDArray[np.bool_]:
         return np.array([at is not None for at in sweep(first, observation_model, coarse, motion, placer)])
 
-    grid = frame_plane(start, observation_model, motion, plane, steps, met)
+    grid = choose_plane_grid(start, observation_model, motion, plane, steps, met)
     configurations = sweep(start, observation_model, grid, motion, placer)
     if not any(configurations):
         raise NoReachablePose(
             start.model.mechanism.name,
             f"the plane {grid.fixed}",
             "none of its poses is reached",
-            grid_dependence(start, motion, grid),
+            explain_grid_dependence(start, motion, grid),
         )
 
     def field(measured: MeasuredRobot) -> SingularityMap:
@@ -144,7 +147,9 @@ def _locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None
         places, here = [i for i, _ in reached], [at for _, at in reached]
         quick = Quick.of(placer, measured.observation_model)
         smallest, largest = (
-            spectrum(here, measured.observation_model) if quick is None else quick.spectrum(here, spectrum)
+            compute_spectrum(here, measured.observation_model)
+            if quick is None
+            else quick.spectrum(here, compute_spectrum)
         )
         value = condition.evaluate(measured.pattern.values_at(here))
         tables = []
@@ -154,9 +159,9 @@ def _locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None
             tables.append(table.reshape(grid.shape))
         spots, curve = np.zeros((0, 2)), np.zeros((0, 2, 2))
         if not (condition.signed or condition.never):
-            spots = _spots(grid, [here[places.index(i)] for i in _valleys(tables[1])], measured)
+            spots = _find_isolated_poses(grid, [here[places.index(i)] for i in _find_valleys(tables[1])], measured)
             curve = PlaneOfPoses(measured.observation_model, motion, grid).curve(configurations)
-            spots = _aside(spots, curve, grid)
+            spots = _drop_near_curve(spots, curve, grid)
         return SingularityMap(
             tables[0], condition.signed, tables[1], tables[2], spots, curve, condition.never, not measured.unexamined
         )
@@ -164,7 +169,7 @@ def _locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None
     return Locus(grid, field(hidden), None if real is None else field(real))
 
 
-def frame_plane(
+def choose_plane_grid(
     start: ClosedConfiguration,
     observation_model: ObservationModel,
     motion: PlatformMotion,
@@ -174,17 +179,20 @@ def frame_plane(
 ) -> Grid:
     """Return the grid around the reached part of a plane; ``met`` is the mask of reached cells of a coarse one, (n,).
     Raises ``NoReachablePose`` if the plane is out of reach, ``BadRequest`` unless two parts are free."""
-    plane, names, first = _begin_plane(start, observation_model, motion, plane)
-    centre = _coordinates(motion, first, names)
+    plane, names, first = _start_plane(start, observation_model, motion, plane)
+    centre = _read_coordinates(motion, first, names)
     centre = [0.0 if name == "phi" else c for name, c in zip(names, centre, strict=True)]
     for wide in LOCUS_SIDES:
         half = [np.pi if name == "phi" else wide * start.model.length for name in names]
-        axes = [(name, np.linspace(c - h, c + h, COARSE_GRID)) for name, c, h in zip(names, centre, half, strict=True)]
+        axes = [
+            (name, np.linspace(c - h, c + h, COARSE_GRID_SIDE_COUNT))
+            for name, c, h in zip(names, centre, half, strict=True)
+        ]
         coarse = Grid(tuple(axes), plane)
         cells = np.argwhere(met(first, coarse).reshape(coarse.shape))
         if not len(cells):
-            cells = np.array([[COARSE_GRID // 2, COARSE_GRID // 2]])
-        if cells.min() > 0 and cells.max() < COARSE_GRID - 1:
+            cells = np.array([[COARSE_GRID_SIDE_COUNT // 2, COARSE_GRID_SIDE_COUNT // 2]])
+        if cells.min() > 0 and cells.max() < COARSE_GRID_SIDE_COUNT - 1:
             break
     steps_apart = np.array([values[1] - values[0] for _, values in axes])
     found = np.array(
@@ -197,14 +205,14 @@ def frame_plane(
     for axis, end in product(range(2), range(2)):
         (pose,) = coarse.poses_at([cells[np.argsort(cells[:, axis], kind="stable")[-end]]])
         try:
-            beside[axis, end] = reach(first, observation_model, pose, motion)
-        except PoseNotReached:
+            beside[axis, end] = track_to_pose(first, observation_model, pose, motion)
+        except PoseReachFailure:
             beside[axis, end] = first
     moved = np.inf
     while moved > 1:
         before = found.copy()
         for (axis, end), near in beside.items():
-            found[axis, end] = _last(coarse, found, axis, end, partial(met, near))
+            found[axis, end] = _find_plane_end(coarse, found, axis, end, partial(met, near))
         moved = float(np.max(np.abs(found - before) / steps_apart[:, None]))
     window = found + 0.75 * steps_apart[:, None] * [-1, 1]
     return Grid(
@@ -212,25 +220,25 @@ def frame_plane(
     )
 
 
-def _begin_plane(
+def _start_plane(
     start: ClosedConfiguration, observation_model: ObservationModel, motion: PlatformMotion, plane: Pose | None
 ) -> tuple[Pose, tuple[str, ...], ClosedConfiguration]:
     """The plane's fixed parts, the two that vary, and a configuration in it; raises as ``framed``."""
-    plane, names = _axes(start, motion, plane)
+    plane, names = _choose_axes(start, motion, plane)
     try:
-        return plane, names, reach(start, observation_model, plane, motion) if plane.given else start
-    except PoseNotReached as error:
+        return plane, names, track_to_pose(start, observation_model, plane, motion) if plane.given else start
+    except PoseReachFailure as error:
         name = start.model.mechanism.name
         raise NoReachablePose(name, f"the plane {plane}", str(error).removeprefix(f"{name}: ")) from None
 
 
-def _last(coarse: Grid, found: Array, axis: int, end: int, met: Callable[[Grid], NDArray[np.bool_]]) -> float:
+def _find_plane_end(coarse: Grid, found: Array, axis: int, end: int, met: Callable[[Grid], NDArray[np.bool_]]) -> float:
     """Return the reached extent of a plane along one axis, to half a step of the coarse grid: ``found`` (2, 2) by it,
     and thinner tips beyond, of which cells are ``CLOSER``."""
     (_, along), (_, across) = coarse.axes[axis], coarse.axes[1 - axis]
     step, apart, last = (along[1] - along[0]) * (2 * end - 1), across[1] - across[0], float(found[axis, end])
     low, high = found[1 - axis]
-    columns = np.arange(low - apart, high + apart, apart / CLOSER)
+    columns = np.arange(low - apart, high + apart, apart / BOUNDARY_REFINEMENT_COUNT)
     while (along[-end] - last) / step > 0.5:
         rows = last + step * np.arange(0, 2, 0.5)
         axes = ((coarse.names[axis], rows), (coarse.names[1 - axis], columns))
@@ -243,7 +251,9 @@ def _last(coarse: Grid, found: Array, axis: int, end: int, met: Callable[[Grid],
     return last
 
 
-def _axes(start: ClosedConfiguration, motion: PlatformMotion, plane: Pose | None) -> tuple[Pose, tuple[str, ...]]:
+def _choose_axes(
+    start: ClosedConfiguration, motion: PlatformMotion, plane: Pose | None
+) -> tuple[Pose, tuple[str, ...]]:
     """The plane's fixed parts, without those that never change, and the two that vary."""
     plane = plane or Pose()
     name = start.model.mechanism.name
@@ -252,12 +262,12 @@ def _axes(start: ClosedConfiguration, motion: PlatformMotion, plane: Pose | None
     fixed = set(plane.given)
     turned = bool(fixed & {"phi", "rpy"})
     parts = [part for part in motion.parts if part != "rpy" and not (part == "phi" and turned)]
-    if not fixed and motion.planar:
+    if not fixed and motion.is_planar:
         plane, turned = replace(plane, phi=0.0), True
     places = [part for part in parts if part in "xyz" and part not in fixed]
     count = motion.shifts - len(fixed & set("xyz"))
     if count == 3:
-        plane, places, count = replace(plane, z=round(_coordinates(motion, start, ("z",))[0], 9)), places[:2], 2
+        plane, places, count = replace(plane, z=round(_read_coordinates(motion, start, ("z",))[0], 9)), places[:2], 2
     if count == 2:
         return plane, max(combinations(places, 2), key=lambda pair: _spread(motion, pair))
     if count == 1 and "phi" in parts and not turned and motion.dof > motion.shifts:
@@ -278,7 +288,7 @@ def _spread(motion: PlatformMotion, pair: tuple[str, str]) -> float:
     return round(float(np.linalg.svd(rows, compute_uv=False).prod()), 9)
 
 
-def _coordinates(motion: PlatformMotion, at: ClosedConfiguration, names: Sequence[str]) -> list[float]:
+def _read_coordinates(motion: PlatformMotion, at: ClosedConfiguration, names: Sequence[str]) -> list[float]:
     X = at.pose(motion.link)
     position, turn = motion.position(X), X[:3, :3] @ motion.home[:3, :3].T
     return [
@@ -286,28 +296,28 @@ def _coordinates(motion: PlatformMotion, at: ClosedConfiguration, names: Sequenc
     ]
 
 
-def _valleys(table: Array) -> list[int]:
+def _find_valleys(table: Array) -> list[int]:
     """The deepest cells that are lower than all their neighbours, by their flat index."""
     filled = np.where(np.isfinite(table), table, np.inf)
     padded = np.pad(filled, 1, constant_values=np.inf)
     nx, ny = table.shape
     around = [padded[i : i + nx, j : j + ny] for i in range(3) for j in range(3) if (i, j) != (1, 1)]
     cells = np.flatnonzero((filled < np.inf) & (filled <= np.min(around, axis=0)))
-    return sorted(map(int, cells), key=lambda cell: float(filled.flat[cell]))[:STARTS]
+    return sorted(map(int, cells), key=lambda cell: float(filled.flat[cell]))[:ISOLATED_POSE_STARTS_COUNT]
 
 
-def _same_mode(
+def _is_singular_in_same_mode(
     start: ClosedConfiguration, at: ClosedConfiguration, observation_model: ObservationModel, motion: PlatformMotion
 ) -> bool:
     """Return True if the pose of ``at`` is singular in the working mode of ``start``, too."""
     try:
-        there = reach(start, observation_model, motion.pose(at.pose(motion.link)), motion)
-    except PoseNotReached:
+        there = track_to_pose(start, observation_model, motion.pose(at.pose(motion.link)), motion)
+    except PoseReachFailure:
         return False
-    return weakest(there, observation_model) < SAME_RELATION
+    return compute_smallest_value(there, observation_model) < RELATION_ANGLE_TOL
 
 
-def _aside(spots: Array, curve: Array, grid: Grid) -> Array:
+def _drop_near_curve(spots: Array, curve: Array, grid: Grid) -> Array:
     """The singular poses that are more than a cell away from a curve."""
     if not len(curve):
         return spots
@@ -316,7 +326,7 @@ def _aside(spots: Array, curve: Array, grid: Grid) -> Array:
     return np.asarray(spots[away > 1])
 
 
-def _spots(grid: Grid, starts: Sequence[ClosedConfiguration], measured: MeasuredRobot) -> Array:
+def _find_isolated_poses(grid: Grid, starts: Sequence[ClosedConfiguration], measured: MeasuredRobot) -> Array:
     """Singular poses in the plane, searched from its poses of smallest singular value."""
     motion, observation_model = measured.setup.motion, measured.observation_model
     found: list[list[float]] = []
@@ -325,8 +335,8 @@ def _spots(grid: Grid, starts: Sequence[ClosedConfiguration], measured: Measured
         if at is None:
             continue
         error, _ = motion.goal(grid.fixed).error_and_jacobian(at.model, at.q)
-        place = _coordinates(motion, at, grid.names)
-        new = all(np.linalg.norm(np.subtract(place, other)) > SAME_SPOT for other in found)
-        if new and np.linalg.norm(error) < ON_PLANE and _same_mode(start, at, observation_model, motion):
+        place = _read_coordinates(motion, at, grid.names)
+        new = all(np.linalg.norm(np.subtract(place, other)) > SINGULAR_POSE_DISTANCE_TOL for other in found)
+        if new and np.linalg.norm(error) < ON_PLANE and _is_singular_in_same_mode(start, at, observation_model, motion):
             found.append(place)
     return np.array(found).reshape(-1, 2)

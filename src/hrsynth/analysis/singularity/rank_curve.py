@@ -14,14 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from ...batch.pose_continuation import reach
-from ...errors import PoseNotReached, UndefinedValue
+from ...batch.pose_continuation import track_to_pose
+from ...errors import PoseReachFailure, UndefinedValue
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.velocity_relation import ObservationModel
 from ...mechanism.pose import Grid
-from .rank_descent import twists_seen
+from .rank_descent import measure_twists
 
 HALVINGS, LEFT, FALLS = 6, 0.1, 0.75
 """Largest number of bisections of an edge, and the fractions of the end values that may remain: at the end, and in the
@@ -38,7 +38,7 @@ class _Weakest:
     u: Array
     v: Array
 
-    def changes(self, other: _Weakest) -> bool:
+    def has_zero_before(self, other: _Weakest) -> bool:
         """Return True if the value passes through zero on the path to another pose, where the vectors change little."""
         return float(self.u @ other.u) * float(self.v @ other.v) < 0
 
@@ -63,7 +63,7 @@ class PlaneOfPoses:
         for (i, j), one in weak.items():
             for along, beside in enumerate(((i + 1, j), (i, j + 1))):
                 other = weak.get(beside)
-                place = None if other is None or not one.changes(other) else self._zero(one, other)
+                place = None if other is None or not one.has_zero_before(other) else self._zero(one, other)
                 if place is not None:
                     crossed[i, j, along] = place
         pieces: list[Any] = []
@@ -74,7 +74,7 @@ class PlaneOfPoses:
 
     def _weakest(self, at: ClosedConfiguration, place: Array) -> _Weakest | None:
         try:
-            U, sizes, V = np.linalg.svd(twists_seen(at, self.observation_model), full_matrices=False)
+            U, sizes, V = np.linalg.svd(measure_twists(at, self.observation_model), full_matrices=False)
         except UndefinedValue:
             return None
         return _Weakest(at, place, float(sizes[-1]), U[:, -1], V[-1])
@@ -88,8 +88,8 @@ class PlaneOfPoses:
             middle = self._between(one, other)
             if middle is None or middle.sigma > FALLS * max(one.sigma, other.sigma):
                 return None
-            one, other = (one, middle) if one.changes(middle) else (middle, other)
-        if max(one.sigma, other.sigma) > least or not one.changes(other):
+            one, other = (one, middle) if one.has_zero_before(middle) else (middle, other)
+        if max(one.sigma, other.sigma) > least or not one.has_zero_before(other):
             return None
         part = one.sigma / (one.sigma + other.sigma) if one.sigma + other.sigma > 0 else 0.5
         return np.asarray(one.place + part * (other.place - one.place))
@@ -97,7 +97,7 @@ class PlaneOfPoses:
     def _between(self, one: _Weakest, other: _Weakest) -> _Weakest | None:
         place = (one.place + other.place) / 2
         try:
-            at = reach(one.at, self.observation_model, self.grid.pose(place.tolist()), self.motion)
-        except PoseNotReached:
+            at = track_to_pose(one.at, self.observation_model, self.grid.pose(place.tolist()), self.motion)
+        except PoseReachFailure:
             return None
         return self._weakest(at, place)

@@ -6,31 +6,31 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Literal, NamedTuple
 
-from ...budgets import NEIGHBOUR_STEP
-from ...constraints.condition import Condition, always
-from ...constraints.excluded_poses import unexamined_poses
+from ...budgets import SINGULAR_NEIGHBOUR_STEP_M
+from ...constraints.condition import Condition, describe_permanent_loss
+from ...constraints.excluded_poses import describe_excluded_poses
 from ...constraints.pattern import ConstraintPattern
 from ...errors import BadRequest
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.joint_coordinates import OfConfiguration
 from ...kinematics.tasks import solve
-from ...kinematics.velocity_relation import ObservationModel, platform_motions, relation
+from ...kinematics.velocity_relation import ObservationModel, compute_platform_motions, compute_relation
 from ...mechanism.pose import Pose
 from ...options import option
 from ...progress import report
 from ...records import As, Recorded, Shown, Word, recorded
 from ...results import Result, Value
-from ...tolerances import SOLVED
+from ...tolerances import CLOSURE_SOLVER_TOL
 from ..analysis_declaration import analysis
 from ..freedoms import Freedom, name_freedoms
 from ..measured import MeasuredRobot
 from ..observed import POINTS, CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike
 from ..verdict import Verdict
-from .condition_check import Agreement, agreement, weakest
+from .condition_check import Agreement, compare_condition, compute_smallest_value
 
-RANDOM_POSES = 10_000
+CONDITION_RANDOM_POSES_COUNT = 10_000
 """Random poses at which words, expression and rank are compared."""
-EXAMPLES = 3
+SINGULARITY_EXAMPLES_COUNT = 3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -45,7 +45,7 @@ class Example(OfConfiguration, Value):
     nearby: Annotated[float, As("singular_value_nearby"), "at 1 cm distance"]
 
 
-class Measured(NamedTuple):
+class MeasuredValues(NamedTuple):
     """Measured values, hidden or real robot."""
 
     kind: Literal["directions", "observations", "motors"]
@@ -59,7 +59,7 @@ class Factor(NamedTuple):
     meaning: str
 
 
-class Unchecked(NamedTuple):
+class UncheckedCondition(NamedTuple):
     """Check that is omitted, since a dof is unobserved everywhere."""
 
     points: int
@@ -113,7 +113,9 @@ class Singularity(Result, shown_as="singularities"):
     @recorded()
     def unexamined(self) -> tuple[str, ...]:
         """Poses to which the condition does not apply, in words; none where it is computed at each pose anew."""
-        return unexamined_poses(self.setup.decomposition, self.pattern, self.condition, self.setup.configurations)
+        return describe_excluded_poses(
+            self.setup.decomposition, self.pattern, self.condition, self.setup.configurations
+        )
 
     def headline(self) -> str:
         """The robot and the condition in words."""
@@ -121,12 +123,12 @@ class Singularity(Result, shown_as="singularities"):
 
     @property
     @recorded()
-    def measured(self) -> Measured:
+    def measured(self) -> MeasuredValues:
         """Measured values, hidden or real robot."""
         seen = self.observation_model.observations
-        if not self.real and not all(o.by_segment for o in seen):
-            return Measured("observations", [each.leg for each in seen])
-        return Measured("motors" if self.real else "directions", [getattr(o, "joint", o.link) for o in seen])
+        if not self.real and not all(o.is_segment_direction for o in seen):
+            return MeasuredValues("observations", [each.leg for each in seen])
+        return MeasuredValues("motors" if self.real else "directions", [getattr(o, "joint", o.link) for o in seen])
 
     dof = Shown(int, lambda self: self.verdict.dof)
     verdict_record = Shown(Word, lambda self: self.verdict.verdict, As("verdict"))
@@ -144,7 +146,9 @@ class Singularity(Result, shown_as="singularities"):
 
     characteristic_length = Shown(float, lambda self: self.setup.mechanism.length)
     checked_record = Shown(
-        Agreement | Unchecked, lambda self: Unchecked(0, 0) if self.checked is None else self.checked, As("checked")
+        Agreement | UncheckedCondition,
+        lambda self: UncheckedCondition(0, 0) if self.checked is None else self.checked,
+        As("checked"),
     )
 
 
@@ -165,7 +169,7 @@ def singularities(
     real: Annotated[bool, option("Analyse the real robot with its motors instead of the hidden robot.")] = False,
     points: Annotated[
         int, option("Number of random poses at which the condition is checked.", low=1, high=10_000_000)
-    ] = RANDOM_POSES,
+    ] = CONDITION_RANDOM_POSES_COUNT,
     seed: Seed = 0,
 ) -> Singularity:
     """Type 2 singularity condition of a robot, in words and as an expression.
@@ -220,35 +224,45 @@ def singularities(
     report("pattern of the legs' wrenches")
     pattern = measured.pattern
     if verdict.rank < verdict.dof:
-        words = always(pattern, verdict.never)
+        words = describe_permanent_loss(pattern, verdict.never)
         return Singularity(setup, observation_model, real, verdict, pattern, None, words, None, ())
     found = measured.condition
-    checked = agreement(
+    checked = compare_condition(
         setup.all_samples.start, observation_model, pattern, found, points, seed=seed, placer=setup.placer
     )
     report("singularities poses")
-    examples = tuple(_example(setup, observation_model, at) for at in checked.on_locus[:EXAMPLES])
+    examples = tuple(
+        _build_example(setup, observation_model, at) for at in checked.on_locus[:SINGULARITY_EXAMPLES_COUNT]
+    )
     return Singularity(setup, observation_model, real, verdict, pattern, found, found.words, checked, examples)
 
 
-def _example(setup: ObservedRobot, observation_model: ObservationModel, at: ClosedConfiguration) -> Example:
+def _build_example(setup: ObservedRobot, observation_model: ObservationModel, at: ClosedConfiguration) -> Example:
     X = at.pose(observation_model.platform)
-    lost = name_freedoms(relation(at, observation_model).unobserved_twists, setup.decomposition, position=X[:3, 3])
-    nearby = max(
-        (weakest(other, observation_model) for other in neighbours(at, observation_model, NEIGHBOUR_STEP)), default=0.0
+    lost = name_freedoms(
+        compute_relation(at, observation_model).unobserved_twists, setup.decomposition, position=X[:3, 3]
     )
-    return Example(at, setup.motion.pose(X), lost, weakest(at, observation_model), nearby)
+    nearby = max(
+        (
+            compute_smallest_value(other, observation_model)
+            for other in find_neighbours(at, observation_model, SINGULAR_NEIGHBOUR_STEP_M)
+        ),
+        default=0.0,
+    )
+    return Example(at, setup.motion.pose(X), lost, compute_smallest_value(at, observation_model), nearby)
 
 
-def neighbours(
+def find_neighbours(
     at: ClosedConfiguration, observation_model: ObservationModel, distance: float
 ) -> list[ClosedConfiguration]:
     """Return configurations whose platform has moved by ``distance`` (m; for rotations times the characteristic
     length), to both sides in each of its dof."""
-    motion = platform_motions(at, observation_model)
+    motion = compute_platform_motions(at, observation_model)
     found = []
     for column in (*motion.T, *-motion.T):
-        q, residual = solve(at.model, at.model.integrate(at.q, column * distance / at.model.length), tolerance=SOLVED)
-        if residual <= 10 * SOLVED:
+        q, residual = solve(
+            at.model, at.model.integrate(at.q, column * distance / at.model.length), tolerance=CLOSURE_SOLVER_TOL
+        )
+        if residual <= 10 * CLOSURE_SOLVER_TOL:
             found.append(ClosedConfiguration.of(at.model, q))
     return found

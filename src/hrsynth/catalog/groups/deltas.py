@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from itertools import combinations_with_replacement, product
 
 from ..architecture_key import ArchitectureKey, LegKey
-from .legs import leg, pairs, robots
+from .legs import list_leg_pairs, list_robots_with, parse_leg
 
 RODS = ("2SSt", "Utn-Unt", "Utn-S")
 """Two rods apart along the tangent, and one rod whose outer axes are tangential."""
@@ -22,30 +22,30 @@ def belongs(word: ArchitectureKey) -> bool:
     )
 
 
-def _legs(bases: tuple[str, ...], rods: tuple[str, ...]) -> list[LegKey]:
-    return [leg(f"{base}-{rod}") for base, rod in product(bases, rods)]
+def _list_legs(bases: tuple[str, ...], rods: tuple[str, ...]) -> list[LegKey]:
+    return [parse_leg(f"{base}-{rod}") for base, rod in product(bases, rods)]
 
 
 def words() -> Iterator[ArchitectureKey]:
     """Two to four legs, alike or mixed; five and six of at most two kinds; rails along one and along three axes of the
     base; rods with U at their upper ends; and articulated platforms with two legs on each plate."""
-    kinds = _legs(BASES, RODS)
+    kinds = _list_legs(BASES, RODS)
     for count in (2, 3, 4):
-        yield from robots(kinds, count)
+        yield from list_robots_with(kinds, count)
     for count in (5, 6):
-        yield from pairs(kinds, count)
+        yield from list_leg_pairs(kinds, count)
     for rod in (*RODS, "2USt"):
         along, across, up = (
-            leg(f"P{axis}*-{rod.replace('t', side)}") for axis, side in (("x", "y"), ("y", "z"), ("z", "x"))
+            parse_leg(f"P{axis}*-{rod.replace('t', side)}") for axis, side in (("x", "y"), ("y", "z"), ("z", "x"))
         )
         for counts in product(range(3), repeat=3):
             if sum(counts) >= 2:
                 yield ArchitectureKey.of([along] * counts[0] + [across] * counts[1] + [up] * counts[2])
         yield from (ArchitectureKey.of([along] * count) for count in range(2, 7))
-    for chain in _legs(BASES, ("2USt",)):
+    for chain in _list_legs(BASES, ("2USt",)):
         yield from (ArchitectureKey.of([chain] * count) for count in range(2, 7))
     for platform, bases in (("bar", BASES), ("slide", (*BASES, "Px*"))):
-        sides = list(combinations_with_replacement(_legs(bases, RODS[:2]), 2))
+        sides = list(combinations_with_replacement(_list_legs(bases, RODS[:2]), 2))
         for left, right in combinations_with_replacement(sides, 2):
             if left == right or (left[0] == left[1] and right[0] == right[1]):
                 yield ArchitectureKey.of(list(left), list(right), platform=platform)

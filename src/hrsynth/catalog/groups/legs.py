@@ -9,7 +9,7 @@ from itertools import combinations_with_replacement
 from ..architecture_key import COMPOSITE, MOVED, ArchitectureKey, LegKey, parse
 
 
-def leg(text: str) -> LegKey:
+def parse_leg(text: str) -> LegKey:
     """The leg that ``text`` writes, as between the brackets of a word."""
     return parse(f"2({text})").legs[0]
 
@@ -21,12 +21,12 @@ def drive_each_joint(chain: LegKey, places: Iterable[int]) -> Iterator[LegKey]:
             yield LegKey(tuple(replace(joint, motor=i == place) for i, joint in enumerate(chain.joints)))
 
 
-def base_driven(chain: LegKey) -> LegKey:
+def drive_first_joint(chain: LegKey) -> LegKey:
     """The leg with a motor on the first joint that can have one."""
     return next(drive_each_joint(chain, range(len(chain.joints))))
 
 
-def watch_each_segment(chain: LegKey) -> Iterator[LegKey]:
+def list_observed_segments(chain: LegKey) -> Iterator[LegKey]:
     """The leg with each segment observed in turn, one of those that always turn alike."""
     last = len(chain.joints) - (1 if chain.joints[-1].letter in COMPOSITE else 2)
     seen = (
@@ -36,13 +36,13 @@ def watch_each_segment(chain: LegKey) -> Iterator[LegKey]:
     yield from dict.fromkeys(seen)
 
 
-def robots(legs: Sequence[LegKey], count: int, platform: str = "") -> Iterator[ArchitectureKey]:
+def list_robots_with(legs: Sequence[LegKey], count: int, platform: str = "") -> Iterator[ArchitectureKey]:
     """All robots with ``count`` of these legs, alike or not."""
     for chosen in combinations_with_replacement(legs, count):
         yield ArchitectureKey.of(list(chosen), platform=platform)
 
 
-def pairs(legs: Sequence[LegKey], count: int) -> Iterator[ArchitectureKey]:
+def list_leg_pairs(legs: Sequence[LegKey], count: int) -> Iterator[ArchitectureKey]:
     """All robots with ``count`` legs of at most two kinds."""
     for i, one in enumerate(legs):
         yield ArchitectureKey.of([one] * count)

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from itertools import product
 
 from ..architecture_key import ArchitectureKey, LegKey
-from ..geometry import planar as belongs
-from .legs import base_driven, drive_each_joint, leg, robots, watch_each_segment
+from ..geometry import is_planar_key as belongs
+from .legs import drive_each_joint, drive_first_joint, list_observed_segments, list_robots_with, parse_leg
 
 __all__ = ["belongs", "chains", "words"]
 
@@ -27,25 +27,25 @@ def chains(rail: str = "h") -> Iterator[LegKey]:
             continue
         own = iter([rail, *(name for name in _OWN if name != rail)] if letters[0] == "P" else _OWN)
         names = ["z" if letter == "R" else "l" if letters == ("R", "P", "R") else next(own) for letter in letters]
-        yield leg("-".join(map("".join, zip(letters, names, strict=True))))
+        yield parse_leg("-".join(map("".join, zip(letters, names, strict=True))))
 
 
-def with_parallelograms() -> Iterator[LegKey]:
+def list_parallelogram_chains() -> Iterator[LegKey]:
     """Chains of three R, P and Π, with an R, a Π, and a joint of another kind or R or P besides."""
     for letters in product(("R", "P", "Pi"), repeat=3):
         if "R" in letters and "Pi" in letters:
             own = iter(_OWN)
-            yield leg("-".join(f"P{next(own)}" if letter == "P" else f"{letter}z" for letter in letters))
+            yield parse_leg("-".join(f"P{next(own)}" if letter == "P" else f"{letter}z" for letter in letters))
 
 
-def _kinds(rail: str, motors: int, tip: str = "RP") -> list[LegKey]:
+def _list_kinds(rail: str, motors: int, tip: str = "RP") -> list[LegKey]:
     """Chains with each motor on the first ``motors`` joints and each segment observed; with the rail x only those that
     begin with a P."""
     return [
         moved
         for chain in chains(rail)
         if chain.joints[-1].letter in tip and (rail == "h" or chain.joints[0].letter == "P")
-        for seen in watch_each_segment(chain)
+        for seen in list_observed_segments(chain)
         for moved in drive_each_joint(seen, range(motors))
     ]
 
@@ -54,18 +54,18 @@ def words() -> Iterator[ArchitectureKey]:
     """Yield robots with three and with two dof, of general geometry and with parallel rails, and with one leg more than
     dof."""
     for rail in ("h", "x"):
-        yield from robots(_kinds(rail, 3), 3)
-        yield from robots(_kinds(rail, 2, tip="R"), 2, "point")
-    for chain in with_parallelograms():
-        for seen in watch_each_segment(chain):
+        yield from list_robots_with(_list_kinds(rail, 3), 3)
+        yield from list_robots_with(_list_kinds(rail, 2, tip="R"), 2, "point")
+    for chain in list_parallelogram_chains():
+        for seen in list_observed_segments(chain):
             for moved in drive_each_joint(seen, range(3)):
                 yield ArchitectureKey.of([moved] * 3)
                 if chain.joints[-1].letter == "R":
                     yield ArchitectureKey.of([moved] * 2, platform="point")
     simple, mixed = (
-        [base_driven(seen) for chain in kinds for seen in watch_each_segment(chain)]
-        for kinds in (chains(), [*chains(), *with_parallelograms()])
+        [drive_first_joint(seen) for chain in kinds for seen in list_observed_segments(chain)]
+        for kinds in (chains(), [*chains(), *list_parallelogram_chains()])
     )
-    yield from robots(simple, 4)
-    yield from robots(mixed, 3)
-    yield from robots([each for each in mixed if each.joints[-1].letter == "R"], 2, "point")
+    yield from list_robots_with(simple, 4)
+    yield from list_robots_with(mixed, 3)
+    yield from list_robots_with([each for each in mixed if each.joints[-1].letter == "R"], 2, "point")

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..architecture_key import ArchitectureKey
-from .legs import leg, robots
+from .legs import list_robots_with, parse_leg
 
-KINDS = tuple(map(leg, ("Utn-Pl*-S", "Utn-Pl*-Unt", "Rt-Pl*-S", "S-Pl*-S", "S-Pl*-Rt", "Pr*-Pz-S", "Cr*-Pz-S")))
+KINDS = tuple(map(parse_leg, ("Utn-Pl*-S", "Utn-Pl*-Unt", "Rt-Pl*-S", "S-Pl*-S", "S-Pl*-Rt", "Pr*-Pz-S", "Cr*-Pz-S")))
 """UPS, UPU (parallel outer axes), RPS, SPS, SPR, and PPS, CPS that slide along the radius."""
-UNCONSTRAINED = 6
+UNCONSTRAINED_LEG_DOF_COUNT = 6
 """Dof of a leg that constrains nothing."""
 
 
@@ -29,7 +29,7 @@ def belongs(word: ArchitectureKey) -> bool:
 def words() -> Iterator[ArchitectureKey]:
     """Yield robots of three to six legs, alike or mixed, with positive dof by count; and all with equal legs."""
     for count in range(3, 7):
-        for word in robots(KINDS, count):
-            constraints = sum(max(0, UNCONSTRAINED - each.freedoms) for each in word.legs)
-            if constraints < UNCONSTRAINED or len(set(word.legs)) == 1:
+        for word in list_robots_with(KINDS, count):
+            constraints = sum(max(0, UNCONSTRAINED_LEG_DOF_COUNT - each.freedoms) for each in word.legs)
+            if constraints < UNCONSTRAINED_LEG_DOF_COUNT or len(set(word.legs)) == 1:
                 yield word

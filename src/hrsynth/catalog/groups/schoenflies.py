@@ -14,16 +14,16 @@ from collections.abc import Iterator
 from itertools import product
 
 from ..architecture_key import ArchitectureKey, LegKey
-from .legs import base_driven, leg, watch_each_segment
+from .legs import drive_first_joint, list_observed_segments, parse_leg
 
-LEGS = 4
+SCHOENFLIES_LEGS_COUNT = 4
 
 
 def belongs(word: ArchitectureKey) -> bool:
     """Return True if four equal legs of R, P and U rotate only about z and horizontal directions of their own."""
     axes = {axis for leg in word.legs for joint in leg.joints if joint.letter != "P" for axis in joint.axes}
     return (
-        len(word.legs) == LEGS
+        len(word.legs) == SCHOENFLIES_LEGS_COUNT
         and not word.platform
         and len({str(leg.chain) for leg in word.legs}) == 1
         and all(joint.letter in "RPU" for joint in word.legs[0].joints)
@@ -32,7 +32,7 @@ def belongs(word: ArchitectureKey) -> bool:
     )
 
 
-def sequences() -> Iterator[str]:
+def list_sequences() -> Iterator[str]:
     """The legs' letters: z and h for an R of this direction, P."""
     for count in (4, 5):
         for letters in map("".join, product("zhP", repeat=count)):
@@ -43,7 +43,7 @@ def sequences() -> Iterator[str]:
 
 def chains() -> Iterator[LegKey]:
     """The legs of each sequence, with and without each U that is not on the base."""
-    for letters in sequences():
+    for letters in list_sequences():
         own = iter("abc")
         plain = "-".join(f"P{next(own)}" if letter == "P" else f"R{letter}" for letter in letters)
         for text in {
@@ -52,10 +52,13 @@ def chains() -> Iterator[LegKey]:
             for other in (("", ""), ("Rh-Rz", "Uhz"))
         }:
             if text[0] != "U":
-                yield leg(text)
+                yield parse_leg(text)
 
 
 def words() -> Iterator[ArchitectureKey]:
     """Four legs of each chain, each segment observed."""
     for chain in chains():
-        yield from (ArchitectureKey.of([base_driven(seen)] * LEGS) for seen in watch_each_segment(chain))
+        yield from (
+            ArchitectureKey.of([drive_first_joint(seen)] * SCHOENFLIES_LEGS_COUNT)
+            for seen in list_observed_segments(chain)
+        )

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 
-from ..architecture_key import ArchitectureKey, parse, sights
+from ..architecture_key import ArchitectureKey, parse, parse_observations
 
 ROBOTS = (
     "6(Utn-Pl*-S)",
@@ -44,4 +44,4 @@ SEEN = (
 def words() -> Iterator[ArchitectureKey]:
     """Each robot with each set."""
     for robot, seen in product(ROBOTS, SEEN):
-        yield replace(parse(robot), seen=sights(seen))
+        yield replace(parse(robot), seen=parse_observations(seen))

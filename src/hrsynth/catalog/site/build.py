@@ -10,18 +10,18 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from ...errors import BadRequest, BuildStopped
+from ...errors import BadRequest, BuildInterruption
 from ...version import __version__
 from ..build import Tell
-from ..executors import Executor, Made, Stopped, executor
-from ..jsonl import line
+from ..executors import Executor, Made, WorkInterruption, open_executor
+from ..jsonl import format_line
 from ..query import Catalog
 from . import index
-from .folder import FOLDERS, draft
+from .folder import FOLDERS, open_draft
 from .pages import write_pages
-from .structures import Structure, structures
+from .structures import Structure, group_structures
 
-CHUNK = 4
+SITE_PAGES_CHUNK_COUNT = 4
 """Pages that a worker is given at a time."""
 
 
@@ -46,7 +46,7 @@ class Site:
         }
 
 
-def site(
+def write_site(
     catalog: Catalog, target: str | Path, *, workers: int = 1, anew: bool = False, tell: Tell | None = None
 ) -> Site:
     """Write a catalog as a static site into a folder: new, empty, or of an older site, which it replaces as a whole.
@@ -57,17 +57,17 @@ def site(
     ------
     BadRequest
         For a catalog without records, a folder of other files or that cannot be written, another build at work.
-    BuildStopped
+    BuildInterruption
         For a full disk or a worker that died; the pages that were made are kept.
     MissingExtra
         Where joblib is not installed.
     """
     if not len(catalog):
         raise BadRequest("no architecture fits", remedy="Widen the search.")
-    team, tell = executor(workers), tell or (lambda *_: None)
-    every = structures(catalog)
+    team, tell = open_executor(workers), tell or (lambda *_: None)
+    every = group_structures(catalog)
     differ: list[tuple[str, str]] = []
-    with draft(target, _stamp(every), anew=anew) as folder:
+    with open_draft(target, _compute_stamp(every), anew=anew) as folder:
         wanted = [each for each in every if not (folder / FOLDERS[0] / f"{each.name}.html").exists()]
         done = len(every) - len(wanted)
         tell("pages", done, len(every))
@@ -83,13 +83,14 @@ def _make_pages(team: Executor, folder: Path, wanted: Sequence[Structure]) -> It
     packed = [each.pack() for each in wanted]
     try:
         yield from team(
-            partial(write_pages, str(folder)), (packed[i : i + CHUNK] for i in range(0, len(packed), CHUNK))
+            partial(write_pages, str(folder)),
+            (packed[i : i + SITE_PAGES_CHUNK_COUNT] for i in range(0, len(packed), SITE_PAGES_CHUNK_COUNT)),
         )
-    except Stopped as stopped:
-        raise BuildStopped(str(stopped), str(folder)) from stopped
+    except WorkInterruption as stopped:
+        raise BuildInterruption(str(stopped), str(folder)) from stopped
 
 
-def _stamp(every: Iterable[Structure]) -> dict[str, str]:
+def _compute_stamp(every: Iterable[Structure]) -> dict[str, str]:
     """Return a digest of a site's sources: version, templates, entries."""
     digest = sha256()
     for kind in ("assets", "templates"):
@@ -97,5 +98,5 @@ def _stamp(every: Iterable[Structure]) -> dict[str, str]:
         for file in sorted(files, key=lambda file: file.name):
             digest.update(file.read_bytes())
     for each in every:
-        digest.update("\n".join(line(record) for record in each.records).encode())
+        digest.update("\n".join(format_line(record) for record in each.records).encode())
     return {"site": "hrsynth catalog", "version": __version__, "made_from": digest.hexdigest()}

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ...description.files import require_alone, require_folder
 from ...errors import BadRequest
-from ..store import writable
+from ..store import require_writable
 
 STAMP = "site.json"
 """File that marks a folder as a site, with a digest of its sources."""
@@ -22,17 +22,17 @@ OWN = frozenset({STAMP, *FOLDERS, "index.html", "data.js", "index.js", "page.js"
 
 
 @contextlib.contextmanager
-def draft(target: str | Path, stamp: dict[str, str], *, anew: bool = False) -> Iterator[Path]:
+def open_draft(target: str | Path, stamp: dict[str, str], *, anew: bool = False) -> Iterator[Path]:
     """The folder ``.NAME.part`` beside a target, with what a build of the same stamp left there; when the block ends
     without an error it takes the target's place.
 
     Raises ``BadRequest`` for a target that is no site and not empty, or cannot be written, and while another build is
-    at work; ``BuildStopped`` for a full disk.
+    at work; ``BuildInterruption`` for a full disk.
     """
     site = Path(os.path.realpath(target))
     require_replaceable(site, str(target))
     folder = site.with_name(f".{site.name}.part")
-    with writable(folder, "site"), _lock(folder):
+    with require_writable(folder, "site"), _lock(folder):
         _prepare(folder, stamp, anew)
         yield folder
         require_replaceable(site, str(target))
@@ -46,7 +46,7 @@ def require_replaceable(site: Path, said: str) -> None:
         return
     if not site.is_dir():
         raise BadRequest(f"--output {said}: not a folder", remedy="Name a new folder or an older site.")
-    with writable(site, "site"):
+    with require_writable(site, "site"):
         found = {each.name for each in site.iterdir()}
     if found and (STAMP not in found or found - OWN):
         other = sorted(found - OWN) or sorted(found)

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 from ...characters import name_steering
 from ...present import palette
-from ...present.report.pages import environment
+from ...present.report.pages import load_environment
 from ...version import __version__
-from ..known import alias, order
+from ..known import find_alias, order
 from .folder import FOLDERS
-from .structures import Structure, address_name
+from .structures import Structure, hash_name
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -52,37 +52,37 @@ def write(folder: Path, structures: Iterable[Structure]) -> None:
     """Write the index, its data, the scripts and the style; raises ``OSError``."""
     assets = resources.files("hrsynth.catalog.site").joinpath("assets")
     for name in SCRIPTS:
-        own = palette.css() if name.endswith(".css") else ""
+        own = palette.format_css() if name.endswith(".css") else ""
         (folder / name).write_text(own + assets.joinpath(name).read_text(encoding="utf-8"), encoding="utf-8")
     (folder / "report.css").write_text(render("style.css.j2"), encoding="utf-8")
     every = list(structures)
     drawn = [int((folder / FOLDERS[2] / f"{each.name}.svg").exists()) for each in every]
-    held = {**columns(every), "drawn": drawn}
-    (folder / "data.js").write_text(f"const CATALOG = {_compact(held)};\n", encoding="utf-8")
+    held = {**build_columns(every), "drawn": drawn}
+    (folder / "data.js").write_text(f"const CATALOG = {_format_compact(held)};\n", encoding="utf-8")
     (folder / "index.html").write_text(render("index.html", version=__version__), encoding="utf-8")
 
 
-def columns(structures: Iterable[Structure]) -> dict[str, Any]:
+def build_columns(structures: Iterable[Structure]) -> dict[str, Any]:
     """All records as columns of equal length; null, or -1 in columns of places, is what a record does not have."""
     structures = list(structures)
     rows = [(place, record) for place, each in enumerate(structures) for record in each.records]
     found: dict[str, Any] = {"pages": [each.name for each in structures], "page": [place for place, _ in rows]}
     records = [record for _, record in rows]
     found["key"] = [record["key"] for record in records]
-    found["name"] = [address_name(record["key"]) for record in records]
-    found["order"] = _ranks([(*order(record), record["key"]) for record in records])
-    found["alias"] = _places([alias(record["key"]) for record in records])
+    found["name"] = [hash_name(record["key"]) for record in records]
+    found["order"] = _rank_keys([(*order(record), record["key"]) for record in records])
+    found["alias"] = _encode_values([find_alias(record["key"]) for record in records])
     for field in NUMBERS:
         found[field] = [record.get(field) for record in records]
     found["base"] = [None if "base_motors" not in record else int(record["base_motors"]) for record in records]
     for field in TEXTS:
-        found[field] = _places([record.get(field) for record in records])
+        found[field] = _encode_values([record.get(field) for record in records])
     for field in LISTS:
-        found[field] = _places(["; ".join(record.get(field) or ()) or None for record in records])
+        found[field] = _encode_values(["; ".join(record.get(field) or ()) or None for record in records])
     return found
 
 
-def _ranks(keys: list[tuple[Any, ...]]) -> list[int]:
+def _rank_keys(keys: list[tuple[Any, ...]]) -> list[int]:
     """The place of each key among all."""
     found = [0] * len(keys)
     for rank, i in enumerate(sorted(range(len(keys)), key=keys.__getitem__)):
@@ -90,23 +90,23 @@ def _ranks(keys: list[tuple[Any, ...]]) -> list[int]:
     return found
 
 
-def _places(values: list[str | None]) -> dict[str, Any]:
+def _encode_values(values: list[str | None]) -> dict[str, Any]:
     """Each value once, sorted, and for each record the place of its own."""
     known = sorted({value for value in values if value is not None})
     place: dict[str | None, int] = {value: i for i, value in enumerate(known)}
     return {"values": known, "at": [place.get(value, -1) for value in values]}
 
 
-def _compact(data: object) -> str:
+def _format_compact(data: object) -> str:
     return name_steering(json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False))
 
 
 def render(template: str, **values: Any) -> str:
     """The text of a template with these values."""
-    return name_steering(_environment().get_template(template).render(values))
+    return name_steering(_load_environment().get_template(template).render(values))
 
 
-def notation(text: str) -> Markup:
+def format_notation(text: str) -> Markup:
     """An architecture with lines under its motors, as HTML."""
     from markupsafe import Markup, escape
 
@@ -114,8 +114,8 @@ def notation(text: str) -> Markup:
 
 
 @cache
-def _environment() -> Environment:
-    made: Environment = environment("hrsynth.catalog.site")
-    made.filters.update(notation=notation, named=address_name)
+def _load_environment() -> Environment:
+    made: Environment = load_environment("hrsynth.catalog.site")
+    made.filters.update(notation=format_notation, named=hash_name)
     made.globals.update(explained=EXPLAINED)
     return made

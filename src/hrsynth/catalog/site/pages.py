@@ -10,25 +10,25 @@ from typing import Any
 from ...analysis.derive import Derivation, derive
 from ...analysis.pose_requests import observe
 from ...description import native
-from ...description.files import replacement
+from ...description.files import open_replacement
 from ...errors import HrsynthError
 from ...mechanism.model import Mechanism
-from ...present.drawings.schematic import robot_svg
+from ...present.drawings.schematic import draw_robot_svg
 from ...present.portrait import Portrait
 from ...present.report.pages import PORTRAIT
-from ...present.report.pages import robots as derivation_parts
-from ...present.text.catalog import facts, motors
-from ...present.view.view import plane_normal
+from ...present.report.pages import describe_robot as derivation_parts
+from ...present.text.catalog import describe_motors, list_facts
+from ...present.view.view import find_plane_normal
 from ..architecture_key import parse
-from ..entry import SAMPLES, model, smallest_sets
-from ..executors import Made, Stopped
-from ..geometry import mechanism
+from ..entry import VERDICT_SAMPLES_COUNT, choose_study_model, derive_smallest_sets
+from ..executors import Made, WorkInterruption
+from ..geometry import build_mechanism
 from ..jsonl import Record
-from ..known import alias
+from ..known import find_alias
 from .folder import FOLDERS
 from .index import render
-from .sentences import answer, rules
-from .structures import Structure, address_name
+from .sentences import answer, describe_rules
+from .structures import Structure, hash_name
 
 PAGES, ROBOTS, DRAWINGS = FOLDERS
 """Folders of the pages, of the robot files and of the small drawings."""
@@ -42,11 +42,11 @@ def write_pages(folder: str, parts: Iterable[str]) -> Made:
     found: Made = []
     for part in parts:
         structure = Structure.unpack(part)
-        studied = study(structure.fact)
+        studied = derive_study(structure.fact)
         try:
             _write(Path(folder), structure, studied)
         except OSError as error:
-            raise Stopped(f"{error.filename or folder}: {error.strerror}") from None
+            raise WorkInterruption(f"{error.filename or folder}: {error.strerror}") from None
         found.append((structure.word, studied.differs))
     return found
 
@@ -60,17 +60,17 @@ def _write(folder: Path, structure: Structure, studied: Study) -> None:
         except HrsynthError:
             continue
         if "refused" not in record:
-            (folder / ROBOTS / f"{address_name(record['key'])}.urdf").write_bytes(content)
+            (folder / ROBOTS / f"{hash_name(record['key'])}.urdf").write_bytes(content)
         robots[record["key"]] = robot
     shown = robots.get(structure.fact["key"])
-    drawn = None if shown is None else _portrait(shown, studied)
+    drawn = None if shown is None else _draw_portrait(shown, studied)
     if drawn is not None:
         (folder / DRAWINGS / f"{structure.name}.svg").write_text(drawn.svg(*SMALL), encoding="utf-8")
-    with replacement(folder / PAGES / f"{structure.name}.html") as draft:
-        draft.write_text(page(structure, studied, robots, drawn), encoding="utf-8")
+    with open_replacement(folder / PAGES / f"{structure.name}.html") as draft:
+        draft.write_text(render_page(structure, studied, robots, drawn), encoding="utf-8")
 
 
-def _portrait(robot: Mechanism, studied: Study) -> Portrait:
+def _draw_portrait(robot: Mechanism, studied: Study) -> Portrait:
     """Draw the robot in space, with its observed links and plane of motion if known."""
     if studied.derivation is None:
         return Portrait.draw(robot, [robot.platform], (), None)
@@ -78,12 +78,12 @@ def _portrait(robot: Mechanism, studied: Study) -> Portrait:
     return Portrait.draw(
         robot,
         [link for link in setup.decomposition.platform if link in robot.links] or [robot.platform],
-        _known_links(studied.observed, robot) or (),
-        plane_normal(setup.motion),
+        _find_named_links(studied.observed, robot) or (),
+        find_plane_normal(setup.motion),
     )
 
 
-def page(structure: Structure, studied: Study, robots: dict[str, Mechanism], drawn: Portrait | None) -> str:
+def render_page(structure: Structure, studied: Study, robots: dict[str, Mechanism], drawn: Portrait | None) -> str:
     """The page; ``robots`` are the mechanisms that are drawn, by word; ``drawn`` is the robot in space."""
     found, record = studied.derivation, structure.fact
     shown = robots.get(record["key"])
@@ -91,7 +91,7 @@ def page(structure: Structure, studied: Study, robots: dict[str, Mechanism], dra
     if found is not None:
         known = derivation_parts(found)
     if shown is not None:
-        known["graphs"][:1] = [robot_svg(shown, observed=_known_links(studied.observed, shown))]
+        known["graphs"][:1] = [draw_robot_svg(shown, observed=_find_named_links(studied.observed, shown))]
     return render(
         "page.html",
         **known
@@ -103,31 +103,34 @@ def page(structure: Structure, studied: Study, robots: dict[str, Mechanism], dra
         },
         structure=structure,
         record=record,
-        facts=list(facts(record, studied.smallest)),
-        alias=alias(record["key"]),
-        rules=list(rules(record)),
+        facts=list(list_facts(record, studied.smallest)),
+        alias=find_alias(record["key"]),
+        rules=list(describe_rules(record)),
         differs=studied.differs,
-        variants=[_variant(each, None if "refused" in each else robots.get(each["key"])) for each in structure.records],
+        variants=[
+            _describe_variant(each, None if "refused" in each else robots.get(each["key"]))
+            for each in structure.records
+        ],
     )
 
 
-def _known_links(links: Iterable[str] | None, robot: Mechanism) -> list[str] | None:
+def _find_named_links(links: Iterable[str] | None, robot: Mechanism) -> list[str] | None:
     """The observed links that the robot has by name."""
     return None if links is None else [link for link in links if link in robot.links]
 
 
-def _driven_joints(robot: Mechanism) -> list[str]:
-    return [joint.name for joint in robot.joints.values() if joint.actuated]
+def _list_actuated_joints(robot: Mechanism) -> list[str]:
+    return [joint.name for joint in robot.joints.values() if joint.is_actuated]
 
 
-def _variant(record: Record, robot: Mechanism | None) -> dict[str, Any]:
+def _describe_variant(record: Record, robot: Mechanism | None) -> dict[str, Any]:
     """Return the data of one architecture for a page: name, motors, file."""
     return {
-        "name": address_name(record["key"]),
+        "name": hash_name(record["key"]),
         "key": record["key"],
         "notation": record.get("notation", ""),
-        "motors": motors(record) if "motors" in record else "",
-        "joints": [] if robot is None else _driven_joints(robot),
+        "motors": describe_motors(record) if "motors" in record else "",
+        "joints": [] if robot is None else _list_actuated_joints(robot),
         "file": robot is not None,
     }
 
@@ -149,23 +152,23 @@ class Study:
 
     def real(self, word: str) -> Mechanism:
         """The robot of an architecture of this structure."""
-        return mechanism(parse(word), self.attempt)
+        return build_mechanism(parse(word), self.attempt)
 
 
-def study(record: Record) -> Study:
+def derive_study(record: Record) -> Study:
     """Derive the hidden robot of a record in its dimensions; none where it is refused."""
     attempt = record.get("attempt", 0)
     if "refused" in record:
         return Study(attempt)
     try:
-        drawn = mechanism(model(parse(record["key"])), attempt)
-        found = derive(observe(drawn, samples=SAMPLES), unchecked=False)
+        drawn = build_mechanism(choose_study_model(parse(record["key"])), attempt)
+        found = derive(observe(drawn, samples=VERDICT_SAMPLES_COUNT), unchecked=False)
     except HrsynthError as error:
         return Study(attempt, differs=str(error).splitlines()[0])
-    return Study(attempt, found, _difference(found, record), smallest_sets(record, drawn))
+    return Study(attempt, found, _describe_difference(found, record), derive_smallest_sets(record, drawn))
 
 
-def _difference(found: Derivation, record: Record) -> str:
+def _describe_difference(found: Derivation, record: Record) -> str:
     """Return the result of a derivation if it differs from the entry."""
     hidden = found.hidden_architecture and found.hidden_architecture.ascii
     same = (hidden, found.verdict.verdict, found.verdict.rank) == (

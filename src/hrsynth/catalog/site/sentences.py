@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from ...present.text.sentences import fewest, shows, where_lost
+from ...present.text.sentences import describe_locus, describe_observation, describe_smallest_sets
 from ...present.text.tables import list_words, name_all
 from ..jsonl import Record
 
@@ -37,12 +37,12 @@ _KINDS = {
 }
 
 
-def rules(record: Record) -> Iterator[str]:
+def describe_rules(record: Record) -> Iterator[str]:
     """A sentence for each step of the derivation."""
     for step in record.get("steps", ()):
         found = _STEP.fullmatch(step)
         rule, legs = (step, None) if found is None else (found["rule"], found["legs"])
-        yield RULES[rule].format(legs=_legs(legs)) if rule in RULES else f"{step[:1].upper()}{step[1:]}."
+        yield RULES[rule].format(legs=_name_legs(legs)) if rule in RULES else f"{step[:1].upper()}{step[1:]}."
 
 
 def answer(record: Record) -> Iterator[str]:
@@ -51,39 +51,41 @@ def answer(record: Record) -> Iterator[str]:
         return
     if "sensors" not in record:
         labels = [str(k + 1) for k in range(record["legs"])]
-        yield shows(labels, "legs", record["rank"], record["dof"], " or ".join(record.get("unobserved", ())))
+        yield describe_observation(
+            labels, "legs", record["rank"], record["dof"], " or ".join(record.get("unobserved", ()))
+        )
     if record.get("minimal"):
-        yield fewest(
+        yield describe_smallest_sets(
             record["minimal"], "observations" if "sensors" in record else "legs", record["rank"], record["dof"]
         )
     if record.get("condition"):
-        yield where_lost(record["condition"])
+        yield describe_locus(record["condition"])
     proof = f"Exact in {record['instances']} instances"
     if record["instances"] == 1:
         proof = "Proved in exact arithmetic; loop-invariant incidences hold except with a probability below 1e-9"
     yield f"{proof}{CONFIRMED.format(**record) if 'confirmed' in record else ''}."
-    yield from filter(None, [cure(record)])
+    yield from filter(None, [describe_suggestion(record)])
 
 
-def cure(record: Record) -> str | None:
+def describe_suggestion(record: Record) -> str | None:
     """Return a sentence on further measurements, None if none is needed."""
     said = record.get("suggestion")
     if not said:
         return None
     if said.startswith("none of"):
         return "No set of up to four further measurements shows all dof."
-    parts = [_KINDS[each["kind"]].format(_where(each["name"])) for each in _PART.finditer(said)]
+    parts = [_KINDS[each["kind"]].format(_describe_place(each["name"])) for each in _PART.finditer(said)]
     measured = list_words(parts)
     if said.startswith("not all by"):
         return f"Measure {measured} as well: this shows more, but not all dof."
     return f"Measure {measured} as well: this shows all {record['dof']} dof."
 
 
-def _legs(labels: str | None) -> str:
+def _name_legs(labels: str | None) -> str:
     return "all legs" if labels is None else name_all("leg", labels.split(","))
 
 
-def _where(name: str) -> str:
+def _describe_place(name: str) -> str:
     found = _PLACE.fullmatch(name)
     if found is None:
         return name

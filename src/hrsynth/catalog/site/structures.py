@@ -9,15 +9,15 @@ from hashlib import sha256
 from typing import Any
 
 from ..architecture_key import parse
-from ..jsonl import Record, line
+from ..jsonl import Record, format_line
 
-LENGTH = 12
+STRUCTURE_NAME_DIGITS_COUNT = 12
 """Digits of a name: two of a million words are alike with a probability of 2e-3."""
 
 
-def address_name(word: str) -> str:
+def hash_name(word: str) -> str:
     """The name of a word in addresses: the same for ever, and for any spelling of files."""
-    return sha256(word.encode()).hexdigest()[:LENGTH]
+    return sha256(word.encode()).hexdigest()[:STRUCTURE_NAME_DIGITS_COUNT]
 
 
 OF_MOTORS = frozenset({"key", "notation", "motors", "motor_rank", "driven", "base_motors"})
@@ -36,7 +36,7 @@ class Structure:
     @property
     def name(self) -> str:
         """Its name in addresses."""
-        return address_name(self.word)
+        return hash_name(self.word)
 
     @property
     def fact(self) -> Record:
@@ -45,7 +45,7 @@ class Structure:
 
     def pack(self) -> str:
         """As text that can be sent to another process."""
-        return json.dumps({"key": self.word, "kin": self.kin, "records": [line(each) for each in self.records]})
+        return json.dumps({"key": self.word, "kin": self.kin, "records": [format_line(each) for each in self.records]})
 
     @classmethod
     def unpack(cls, text: str) -> Structure:
@@ -58,11 +58,11 @@ class Structure:
         )
 
 
-def structures(records: Iterable[Record]) -> tuple[Structure, ...]:
+def group_structures(records: Iterable[Record]) -> tuple[Structure, ...]:
     """The structures of records, sorted by word; their records by word too, those with all motors on the base first."""
     alike: dict[str, dict[str, list[Record]]] = {}
     for each in sorted(records, key=lambda record: (not record.get("base_motors"), record["key"])):
-        common = line({**each, **dict.fromkeys(OF_MOTORS), "key": ""})
+        common = format_line({**each, **dict.fromkeys(OF_MOTORS), "key": ""})
         alike.setdefault(str(parse(each["key"]).unmoved), {}).setdefault(common, []).append(each)
     own: dict[str, list[Record]] = {}
     alike_unseen: dict[str, list[str]] = {}

@@ -9,13 +9,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...budgets import LARGEST_GUESSED
+from ...budgets import PLATFORM_GUESS_BODIES_MAX
 from ...errors import BadRequest
-from ...geometry.vectors import Array, inverse
+from ...geometry.vectors import Array, invert_pose
 from ...mechanism import graphs
 from ...mechanism.model import JointType, PlatformChoice
-from ...tolerances import SAME_DIRECTION, SAME_POINT
-from ..jointgraph import JointGraph, JointSpec, first_body
+from ...tolerances import DIRECTION_SINE_TOL, POINT_DISTANCE_TOL
+from ..jointgraph import JointGraph, JointSpec, find_first_body
 
 _WORD = re.compile("[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 _END = re.compile("(.*(foot|hand|flange|gripper|effector|platform))|feet|toe|sole|tool|tcp|eef?")
@@ -45,8 +45,8 @@ def standing(graph: JointGraph, base: str, wanted: str | None, platform: str | N
     robot on a free joint (``<freejoint>``), or on three prismatic and three revolute joints that position it, the
     floating link; if one prismatic joint carries the robot and the loops begin at its slider, that link: a rail is not
     a leg. ``platform`` is the given one."""
-    bonds = graphs.adjacency(graph.links, (joint.links for joint in graph.joints.values()))
-    if wanted is not None and wanted in graph.links and wanted not in graphs.component(bonds, base):
+    bonds = graphs.build_adjacency(graph.links, (joint.links for joint in graph.joints.values()))
+    if wanted is not None and wanted in graph.links and wanted not in graphs.find_component(bonds, base):
         base = wanted
         carriers = {joint.links[1]: joint.links[0] for joint in graph.joints.values() if joint.in_tree}
         for _ in carriers:
@@ -90,7 +90,7 @@ def _without_float(graph: JointGraph, base: str, named: set[str | None]) -> str:
             kinds += str(joint.kind)
             axes += [X[:3, :3] @ axis for axis in joint.axes]
             centres += [X[:3, 3]] * (joint.kind is JointType.REVOLUTE)
-        X, link = X @ inverse(joint.ends[1].X), joint.links[1]
+        X, link = X @ invert_pose(joint.ends[1].X), joint.links[1]
         chain.append(joint)
     left = {each.links[0] for each in chain}
     slides, turns = ([axis for axis, kind in zip(axes, kinds, strict=False) if kind == each] for each in "PR")
@@ -103,8 +103,8 @@ def _without_float(graph: JointGraph, base: str, named: set[str | None]) -> str:
         or any(each.motor is not None or each.name in geared for each in chain)
     ):
         return base
-    ranks = [np.linalg.matrix_rank(np.array(each), SAME_DIRECTION) for each in (slides, turns)]
-    if ranks != [3, 3] or np.max(np.abs(np.array(centres) - centres[0])) > SAME_POINT:
+    ranks = [np.linalg.matrix_rank(np.array(each), DIRECTION_SINE_TOL) for each in (slides, turns)]
+    if ranks != [3, 3] or np.max(np.abs(np.array(centres) - centres[0])) > POINT_DISTANCE_TOL:
         return base
     names = ", ".join(each.name for each in chain)
     graph.note(
@@ -142,7 +142,7 @@ def _is_rail(graph: JointGraph, slide: JointSpec, trunk: str, platform: str | No
 def formation(graph: JointGraph, base: str) -> str | None:
     """Return the first body of a formation, None if there is no formation; record it in the graph."""
     told = [*(each.link for each in graph.sights), *(each.link for each in graph.cameras)]
-    found, _ = first_body(graph.links, (joint.links for joint in graph.joints.values()), base, told)
+    found, _ = find_first_body(graph.links, (joint.links for joint in graph.joints.values()), base, told)
     graph.formation = found is not None
     return found
 
@@ -180,7 +180,7 @@ def has_word(name: str, words: re.Pattern[str]) -> bool:
     return any(words.fullmatch(word.casefold()) for word in _WORD.findall(name))
 
 
-def _ends_robot(name: str) -> bool:
+def _is_end_link_name(name: str) -> bool:
     return has_word(name, _END) and not has_word(name, _SENSOR) and not has_word(name, _DRIVE)
 
 
@@ -196,15 +196,15 @@ class _RigidBodies:
 
     def __init__(self, graph: JointGraph, base: str) -> None:
         joints = list(graph.joints.values())
-        bonds = graphs.adjacency(graph.links, (j.links for j in joints if j.type is JointType.FIXED))
+        bonds = graphs.build_adjacency(graph.links, (j.links for j in joints if j.type is JointType.FIXED))
         order = {link: i for i, link in enumerate(graph.links)}
-        groups = [sorted(group, key=order.__getitem__) for group in graphs.components(bonds)]
+        groups = [sorted(group, key=order.__getitem__) for group in graphs.list_components(bonds)]
         self.members = {group[0]: group for group in groups}
         into = {link: group[0] for group in groups for link in group}
         self.base = into[base]
         pairs = [(into[a], into[b]) for a, b in (joint.links for joint in joints)]
-        self.near = graphs.adjacency(self.members, (pair for pair in pairs if pair[0] != pair[1]))
-        parts = sum(1 for _ in graphs.components(self.near))
+        self.near = graphs.build_adjacency(self.members, (pair for pair in pairs if pair[0] != pair[1]))
+        parts = sum(1 for _ in graphs.list_components(self.near))
         self.loops = sum(map(len, self.near.values())) > 2 * (len(self.near) - parts)
         self.closing = graph.closing
         self.joints: dict[str, list[JointSpec]] = {link: [] for link in graph.links}
@@ -230,7 +230,7 @@ class _RigidBodies:
                     joint.type is JointType.FREE for link in self.members[found[0]] for joint in self.joints[link]
                 )
                 return self.title(found[0]), f"which {most - floats} paths connect to the base", ()
-            distance = graphs.distances(self.near, self.base)
+            distance = graphs.count_edges(self.near, self.base)
             rivals = [body for body in distance if distance[body] == max(distance.values())]
             closed, why = self._closed(others, distance)
         if named and closed and not {*named} & {*closed}:
@@ -262,7 +262,9 @@ class _RigidBodies:
         every = list(dict.fromkeys([*rivals, *ends]))
         found = [body for body in every if not self._is_never(body)]
         names = map(self._end_of, found or every)
-        return sorted(names, key=lambda name: (0, len(name)) if _ends_robot(name) or _PLATE.search(name) else (1, 0))
+        return sorted(
+            names, key=lambda name: (0, len(name)) if _is_end_link_name(name) or _PLATE.search(name) else (1, 0)
+        )
 
     def title(self, body: str) -> str:
         """Return the link that represents a body: its only frame, else the link with most joints."""
@@ -273,18 +275,18 @@ class _RigidBodies:
 
     def _named(self, others: Sequence[str]) -> list[str]:
         """Return the bodies with the name of an end, beyond which there is no other one."""
-        named = [body for body in others if any(map(_ends_robot, self.members[body]))]
+        named = [body for body in others if any(map(_is_end_link_name, self.members[body]))]
         return [body for body in named if self._inward(body).issuperset(named)]
 
     def _inward(self, body: str) -> set[str]:
         """Return the bodies that ``body`` does not separate from the base, and itself."""
         rest = {one: [two for two in ends if two != body] for one, ends in self.near.items() if one != body}
-        return {body, *graphs.component(rest, self.base)}
+        return {body, *graphs.find_component(rest, self.base)}
 
     def _end_of(self, body: str) -> str:
         """Return the link of a body that has the name of an end, if there is one; else the one that represents it."""
         title = self.title(body)
-        return min(filter(_ends_robot, self.members[body]), key=lambda link: link != title, default=title)
+        return min(filter(_is_end_link_name, self.members[body]), key=lambda link: link != title, default=title)
 
     def _is_never(self, body: str) -> bool:
         """Return True if a body is a sensor, or in a loop a rod: by its name, or as it spins about the line of two
@@ -304,7 +306,7 @@ class _RigidBodies:
         nothing for too many bodies."""
         import networkx as nx
 
-        if len(self.near) > LARGEST_GUESSED:
+        if len(self.near) > PLATFORM_GUESS_BODIES_MAX:
             return []
         graph: nx.Graph[str] = nx.Graph((a, b) for a, ends in self.near.items() for b in ends)
         return list(map(set, nx.biconnected_components(graph)))  # type: ignore[arg-type]
@@ -330,7 +332,7 @@ class _RigidBodies:
         number. Not counted for too many bodies."""
         import networkx as nx
 
-        if len(self.near) > LARGEST_GUESSED:
+        if len(self.near) > PLATFORM_GUESS_BODIES_MAX:
             return [], 0
         ways = dict[str, int]()
         for body in (each for each in others if len(self.near[each]) >= 3):

@@ -5,18 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from ...budgets import MOST_LOOP_COORDINATES
-from ...errors import BadMechanism, BadRequest, LoopsNotClosed
-from ...geometry.vectors import Array, unit
+from ...budgets import LOOP_COORDINATES_MAX
+from ...errors import BadMechanism, BadRequest, LoopClosureFailure
+from ...geometry.vectors import Array, normalise_vector
 from ...mechanism.model import FIRST, GIVEN, NAMED, Coupling, Joint, JointType, Mechanism, Note, PlatformChoice
-from ...tolerances import NO_FINER, NOISE, ROUNDED, SAME_GEOMETRY
-from ..jointgraph import JointGraph, JointSpec, comma_list
-from ..jointmotion import cure
-from ..keyframes import STAY, posture
+from ...tolerances import (
+    GEOMETRY_DIFFERENCE_TOL,
+    INCIDENCE_TOL,
+    ROUNDED_INCIDENCE_FRACTION,
+    TOLERANCE_AMBIGUITY_FRACTION,
+)
+from ..jointgraph import JointGraph, JointSpec, join_names
+from ..jointmotion import propose_closure_fix
+from ..keyframes import STAY, find_keyframe
 from ..numerals import Digits
-from ..observation_text import as_written
+from ..observation_text import add_file_observations
 from ..overrides import Overrides
-from ..tree import spanning
+from ..tree import build_spanning_mechanism
 from . import assumptions, closures
 from .candidates import without_loop
 from .coordinates import with_weighed_motors, without_coordinates
@@ -34,7 +39,7 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
     ------
     BadRequest
         For unknown names and a missing platform.
-    LoopsNotClosed, RankUndecided
+    LoopClosureFailure, UndecidedRank
         For loops that stay open, or whose rank is undecided due to rounding.
     """
     closures.join_halves(graph, overrides.named)
@@ -44,37 +49,37 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
     graph.prune(base)
     for role, link in (("base", overrides.base), ("platform", overrides.platform)):
         if link is not None and link not in graph.links:
-            raise BadRequest(f"{graph.file}: no such {role} link", link, comma_list(graph.links, like=link))
+            raise BadRequest(f"{graph.file}: no such {role} link", link, join_names(graph.links, like=link))
     if open_chain := without_loop(graph, base):
         graph.note("open", open_chain)
     graph.formation = graph.formation and overrides.platform is None
     platform, choice = _platform(graph, overrides, base)
     if platform == base and overrides.base is None:
         raise BadRequest(f"{graph.file}: the platform is the base", platform, "another link")
-    start = None if overrides.keyframe is None else graph.in_metres(posture(graph, overrides.keyframe))
+    start = None if overrides.keyframe is None else graph.in_metres(find_keyframe(graph, overrides.keyframe))
     assembly = LoopAssembly(base, list(graph.joints.values()), graph.gears, start)
-    if assembly.size > MOST_LOOP_COORDINATES or len(assembly.loops) > MOST_LOOP_COORDINATES:
+    if assembly.size > LOOP_COORDINATES_MAX or len(assembly.loops) > LOOP_COORDINATES_MAX:
         raise BadRequest(
             f"{graph.file}: too many loops",
             f"{len(assembly.loops)} loops through joints with {assembly.size} coordinates",
-            f"up to {MOST_LOOP_COORDINATES} of each",
+            f"up to {LOOP_COORDINATES_MAX} of each",
         )
     open_at_zero = assembly.worst(assembly.zero())[1]
     length = assembly.length / graph.unit
     rounded = 0.0 if overrides.as_written else overrides.tolerance or rounding(graph.digits, length, open_at_zero)
-    tolerance = overrides.tolerance or max(NOISE, rounded)
-    assembly.noise = max(NOISE, NO_FINER * rounded)
-    if open_at_zero <= NO_FINER * rounded:
+    tolerance = overrides.tolerance or max(INCIDENCE_TOL, rounded)
+    assembly.noise = max(INCIDENCE_TOL, TOLERANCE_AMBIGUITY_FRACTION * rounded)
+    if open_at_zero <= TOLERANCE_AMBIGUITY_FRACTION * rounded:
         solution = LoopSolution(assembly.zero(), open_at_zero)
     else:
         solution = solve(assembly)
     if not solution.residual <= assembly.noise:
-        raise LoopsNotClosed(
+        raise LoopClosureFailure(
             graph.file,
             solution.residual,
             assembly.noise,
             assembly.worst(solution.values)[0],
-            cure(solution.residual) or POSTURE,
+            propose_closure_fix(solution.residual) or POSTURE,
         )
     _note_solution(graph, assembly, solution, overrides.keyframe)
     mechanism = replace(_mechanism(graph, base, platform, assembly, solution.values), choice=choice)
@@ -83,12 +88,14 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
         if not overrides.as_written:
             possible = 0.0 if overrides.tolerance else deviation(graph.digits, length)
             mechanism = snap_geometry(mechanism, solution.residual, tolerance, possible)
-        elif solution.residual > SAME_GEOMETRY:
-            raise LoopsNotClosed(graph.file, solution.residual, SAME_GEOMETRY, assembly.worst(solution.values)[0])
-        mechanism = spanning(mechanism)
+        elif solution.residual > GEOMETRY_DIFFERENCE_TOL:
+            raise LoopClosureFailure(
+                graph.file, solution.residual, GEOMETRY_DIFFERENCE_TOL, assembly.worst(solution.values)[0]
+            )
+        mechanism = build_spanning_mechanism(mechanism)
         if overrides.keyframe != STAY:
             mechanism = _away_from_singular(mechanism)
-    if graph.platform is None and not mechanism.open_platform:
+    if graph.platform is None and not mechanism.has_open_platform:
         mechanism = without_coordinates(mechanism)
     return with_weighed_motors(mechanism)
 
@@ -106,20 +113,20 @@ def _platform(graph: JointGraph, overrides: Overrides, base: str) -> tuple[str, 
 def deviation(digits: Digits, length: float) -> float:
     """Return the rounding error of exact geometry due to the decimals of a file (characteristic lengths, rad);
     ``length`` is the characteristic length in the file's unit."""
-    return ROUNDED * digits.last_place * max(1.0, 1 / length)
+    return ROUNDED_INCIDENCE_FRACTION * digits.last_place * max(1.0, 1 / length)
 
 
 def rounding(digits: Digits, length: float, opening: float) -> float:
     """Return that rounding error; 0 if nothing indicates rounding: neither vectors and angles nor the closure residual
     at zero."""
     found = deviation(digits, length)
-    return found if digits.rounded or SAME_GEOMETRY < opening <= NO_FINER * found else 0.0
+    return found if digits.rounded or GEOMETRY_DIFFERENCE_TOL < opening <= TOLERANCE_AMBIGUITY_FRACTION * found else 0.0
 
 
 def _note_solution(graph: JointGraph, assembly: LoopAssembly, solution: LoopSolution, keyframe: str | None) -> None:
     name, miss = assembly.worst(assembly.zero())
     moved = moves(assembly, solution.values)
-    if moved and miss > SAME_GEOMETRY:
+    if moved and miss > GEOMETRY_DIFFERENCE_TOL:
         pushed = ", after a random push out of a flat configuration" if solution.pushed else ""
         where = "the file's zero configuration" if keyframe is None else f"the keyframe {keyframe!r}"
         graph.note(
@@ -149,7 +156,7 @@ def _mechanism(graph: JointGraph, base: str, platform: str, assembly: LoopAssemb
         formation=graph.formation,
         turns=graph.turns if platform == graph.platform else None,
     )
-    mechanism = as_written(spanning(mechanism), graph.sights, graph.cameras, graph.file)
+    mechanism = add_file_observations(build_spanning_mechanism(mechanism), graph.sights, graph.cameras, graph.file)
     return replace(mechanism, couplings=tuple(_couplings(graph, mechanism)))
 
 
@@ -160,11 +167,11 @@ def joint_at(joint: JointSpec, poses: Mapping[str, Array], in_tree: bool) -> Joi
     axes: tuple[Array, ...] = ()
     if kind is JointType.UNIVERSAL:
         first, second = X_P[:3, :3] @ joint.axes[0], X_S[:3, :3] @ joint.axes[1]
-        axes = first, unit(second - first * float(first @ second))
+        axes = first, normalise_vector(second - first * float(first @ second))
     elif kind.axes:
         both = X_P[:3, :3] @ joint.axes[0], X_S[:3, :3] @ joint.axes[0]
-        axes = (both[0] if in_tree else unit(both[0] + both[1]),)
-    point = X_P[:3, 3] if in_tree or kind.slides or kind is JointType.PLANAR else (X_P[:3, 3] + X_S[:3, 3]) / 2
+        axes = (both[0] if in_tree else normalise_vector(both[0] + both[1]),)
+    point = X_P[:3, 3] if in_tree or kind.has_translation or kind is JointType.PLANAR else (X_P[:3, 3] + X_S[:3, 3]) / 2
     motor = None if kind is JointType.FIXED else joint.motor
     return Joint(joint.name, kind, *joint.links, point, axes, motor, joint.limits, in_tree, joint.xml, joint.line)
 

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...budgets import MOST_CANDIDATES
+from ...budgets import CLOSURE_CANDIDATES_MAX
 from ...geometry.vectors import Array
 from ...mechanism import graphs
 from ...mechanism.model import JointType
-from ...tolerances import MAY_MEET, NOISE
-from ..jointgraph import JointGraph, comma_list
-from ..jointmotion import step_along, zero
+from ...tolerances import CLOSURE_CANDIDATE_DISTANCE_MAX, INCIDENCE_TOL
+from ..jointgraph import JointGraph, join_names
+from ..jointmotion import get_zero_value, step_along
 from .loops import LoopAssembly
 
 
@@ -44,31 +44,41 @@ def closure_candidates(graph: JointGraph, base: str) -> tuple[ClosureCandidate, 
     links = list(at_zero)
     if len(links) < 2:
         return ()
-    bonds = graphs.adjacency(links, (j.links for j in joints if j.type is JointType.FIXED and j.links[0] in at_zero))
-    body = {link: number for number, group in enumerate(graphs.components(bonds)) for link in group}
+    bonds = graphs.build_adjacency(
+        links, (j.links for j in joints if j.type is JointType.FIXED and j.links[0] in at_zero)
+    )
+    body = {link: number for number, group in enumerate(graphs.list_components(bonds)) for link in group}
     joined = {frozenset(body[x] for x in j.links) for j in graph.joints.values() if set(j.links) <= set(at_zero)}
     points, moved = (_points(assembly, links, values) for values in (assembly.zero(), _move_joints(assembly)))
     apart = np.linalg.norm(points[:, None] - points, axis=2) / assembly.length
     apart_moved = np.linalg.norm(moved[:, None] - moved, axis=2) / assembly.length
     # near at zero, and farther apart elsewhere: joints that rotate about the point itself do not separate frames there
-    near = np.argwhere(np.triu((apart <= MAY_MEET) & (apart_moved > apart + MAY_MEET / 2), 1))
+    near = np.argwhere(
+        np.triu(
+            (apart <= CLOSURE_CANDIDATE_DISTANCE_MAX) & (apart_moved > apart + CLOSURE_CANDIDATE_DISTANCE_MAX / 2), 1
+        )
+    )
     busy = Counter(link for joint in joints for link in joint.links)
     ranked = sorted(
         near.tolist(),
-        key=lambda pair: (apart[*pair] > NOISE, sum(busy[links[i]] > 1 for i in pair), apart[*pair], *pair),
+        key=lambda pair: (apart[*pair] > INCIDENCE_TOL, sum(busy[links[i]] > 1 for i in pair), apart[*pair], *pair),
     )
     found: list[ClosureCandidate] = []
     taken: dict[frozenset[int], list[Array]] = {}
     for i, j in ranked:
         bodies = frozenset((body[links[i]], body[links[j]]))
         places = taken.setdefault(bodies, [])
-        if bodies in joined or any(np.linalg.norm(points[i] - p) <= MAY_MEET * assembly.length for p in places):
+        if bodies in joined or any(
+            np.linalg.norm(points[i] - p) <= CLOSURE_CANDIDATE_DISTANCE_MAX * assembly.length for p in places
+        ):
             continue
-        if len(found) == MOST_CANDIDATES:
+        if len(found) == CLOSURE_CANDIDATES_MAX:
             break
         places.append(points[i])
         found.append(
-            ClosureCandidate((links[i], links[j]), float(apart[i, j] * assembly.length), bool(apart[i, j] <= NOISE))
+            ClosureCandidate(
+                (links[i], links[j]), float(apart[i, j] * assembly.length), bool(apart[i, j] <= INCIDENCE_TOL)
+            )
         )
     return tuple(found)
 
@@ -80,7 +90,7 @@ def without_loop(graph: JointGraph, base: str) -> str | None:
     text = "no element of the file closes a loop: it is read as an open chain"
     if found := closure_candidates(graph, base):
         text += (
-            f"; frames close to each other: {comma_list(map(str, found), MOST_CANDIDATES)} (--close "
+            f"; frames close to each other: {join_names(map(str, found), CLOSURE_CANDIDATES_MAX)} (--close "
             f"{found[0].wish} connects the first two in a point)"
         )
     return text
@@ -96,6 +106,6 @@ def _move_joints(assembly: LoopAssembly, seed: int = 0) -> dict[str, Array]:
     """Return random values of all joints."""
     rng = np.random.default_rng(seed)
     return {
-        joint.name: step_along(joint, zero(joint), rng.uniform(0.4, 1.0, joint.kind.freedoms), np.eye(3))
+        joint.name: step_along(joint, get_zero_value(joint), rng.uniform(0.4, 1.0, joint.kind.freedoms), np.eye(3))
         for joint, _, _ in assembly.tree
     }

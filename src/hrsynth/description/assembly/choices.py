@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...errors import BadRequest
-from ...mechanism.model import Mechanism, Note, likely_motors
+from ...mechanism.model import Mechanism, Note, infer_motors
 from .. import formats
 from ..jointgraph import JointGraph, JointSpec
 from ..overrides import Overrides
-from ..reading import robot_file
+from ..reading import open_robot_file
 from . import assumptions, closures
 from .candidates import ClosureCandidate, closure_candidates
 
@@ -44,13 +44,13 @@ class ImportChoices:
     @property
     def proposed_motors(self) -> list[str]:
         """Joints that could have motors if the file names none."""
-        return likely_motors(self.bases[0], self.joints)[0]
+        return infer_motors(self.bases[0], self.joints)[0]
 
 
 def choices(path: Path, overrides: Overrides) -> ImportChoices:
     """Return the open choices of the file at ``path`` once closures, motors and frozen joints are given; raises as
     reading it does."""
-    graph = formats.read(robot_file(path, overrides, strict=False))
+    graph = formats.read(open_robot_file(path, overrides, strict=False))
     if isinstance(graph, Mechanism):
         raise BadRequest(f"{path}: this format leaves no choice open", graph.name)
     closures.join_halves(graph)

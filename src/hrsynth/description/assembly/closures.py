@@ -10,17 +10,17 @@ from itertools import pairwise
 import numpy as np
 
 from ...geometry import lines
-from ...geometry.vectors import Array, frozen, inverse, perpendicular, pose, unit
+from ...geometry.vectors import Array, build_pose, find_perpendicular, freeze_array, invert_pose, normalise_vector
 from ...mechanism import graphs
 from ...mechanism.model import Joint, JointType, Mechanism, Motor, Note
-from ...tolerances import NOISE, ROUNDED
-from ..chains import CUT, END, SECOND, WHOLES, part
+from ...tolerances import INCIDENCE_TOL, ROUNDED_INCIDENCE_FRACTION
+from ..chains import CUT, END, SECOND, WHOLES, name_chain_joint
 from ..jointgraph import FrameSpec, JointGraph, JointSpec, Z
 
 
 def merge_points(graph: JointGraph) -> None:
     """Merge point closures of the same two links: two are a revolute joint through both; three are rigid."""
-    noise = ROUNDED * graph.digits.last_place * graph.unit
+    noise = ROUNDED_INCIDENCE_FRACTION * graph.digits.last_place * graph.unit
     table: dict[frozenset[str], list[JointSpec]] = defaultdict(list)
     for joint in graph.joints.values():
         if joint.type is JointType.SPHERICAL and not joint.in_tree:
@@ -50,22 +50,22 @@ def _joint_through(joints: list[JointSpec], noise: float) -> JointSpec | None:
     arms = points[:, 1:] - points[:, :1]
     sizes = np.linalg.norm(arms, axis=2)
     size = float(np.max(sizes))
-    if size <= 0 or np.max(np.abs(sizes[0] - sizes[1])) > NOISE * size + noise:
+    if size <= 0 or np.max(np.abs(sizes[0] - sizes[1])) > INCIDENCE_TOL * size + noise:
         return None
     k = int(np.argmax(sizes[0]))
     far = [np.linalg.norm(np.cross(arm, arm[k]), axis=1) for arm in arms]
-    m = None if max(each.max() for each in far) <= (NOISE * size + noise) * size else int(np.argmax(far[0]))
+    m = None if max(each.max() for each in far) <= (INCIDENCE_TOL * size + noise) * size else int(np.argmax(far[0]))
     kind = JointType.REVOLUTE if m is None else JointType.FIXED
     one, two = (
-        FrameSpec(end.link, pose(point[0], _frame(arm[k], None if m is None else arm[m])), end.line)
+        FrameSpec(end.link, build_pose(point[0], _frame(arm[k], None if m is None else arm[m])), end.line)
         for end, point, arm in zip(first.ends, points, arms, strict=True)
     )
     return replace(first, type=kind, ends=(one, two), axes=(Z,) * kind.axes)
 
 
 def _frame(z: Array, near: Array | None) -> Array:
-    x = perpendicular(z, near)
-    return np.column_stack((x, np.cross(unit(z), x), unit(z)))
+    x = find_perpendicular(z, near)
+    return np.column_stack((x, np.cross(normalise_vector(z), x), normalise_vector(z)))
 
 
 def points_as_hinges(mechanism: Mechanism, within: float) -> Mechanism:
@@ -86,10 +86,10 @@ def _plane_of(joint: Joint, joints: list[Joint], within: float) -> Array | None:
     """Return the normal of the plane in which the joint's two links move relative to each other, or None."""
     for candidate in _hinges_on(joint, joints):
         normal = candidate.axis
-        flat = graphs.adjacency(
-            joint.links, (j.links for j in joints if j.name != joint.name and _flat(j, normal, within))
+        flat = graphs.build_adjacency(
+            joint.links, (j.links for j in joints if j.name != joint.name and _has_parallel_axis(j, normal, within))
         )
-        if joint.links[1] in graphs.component(flat, joint.links[0]):
+        if joint.links[1] in graphs.find_component(flat, joint.links[0]):
             return normal
     return None
 
@@ -100,35 +100,37 @@ def _spoke_of(joint: Joint, joints: list[Joint], tolerance: float) -> Array | No
     others = [j for j in joints if j.name != joint.name]
     for candidate in _hinges_on(joint, others):
         for other in others:
-            if other.type is not JointType.REVOLUTE or lines.parallel(other.axis, candidate.axis):
+            if other.type is not JointType.REVOLUTE or lines.is_parallel(other.axis, candidate.axis):
                 continue
-            centre = lines.meeting_point([(candidate.point, candidate.axis), (other.point, other.axis)], tolerance)
+            centre = lines.find_meeting_point([(candidate.point, candidate.axis), (other.point, other.axis)], tolerance)
             if centre is None or np.linalg.norm(joint.point - centre) <= tolerance:
                 continue
-            still = graphs.adjacency(joint.links, (j.links for j in others if _keeps(j, centre, tolerance)))
-            if joint.links[1] in graphs.component(still, joint.links[0]):
-                return unit(joint.point - centre)
+            still = graphs.build_adjacency(
+                joint.links, (j.links for j in others if _is_rotation_about(j, centre, tolerance))
+            )
+            if joint.links[1] in graphs.find_component(still, joint.links[0]):
+                return normalise_vector(joint.point - centre)
     return None
 
 
 def _hinges_on(joint: Joint, joints: list[Joint]) -> list[Joint]:
     """Return the revolute joints on the two bodies that a joint connects."""
-    bonds = graphs.adjacency(joint.links, (j.links for j in joints if j.type is JointType.FIXED))
-    bodies = {link for end in joint.links for link in graphs.component(bonds, end)}
+    bonds = graphs.build_adjacency(joint.links, (j.links for j in joints if j.type is JointType.FIXED))
+    bodies = {link for end in joint.links for link in graphs.find_component(bonds, end)}
     return [j for j in joints if j.type is JointType.REVOLUTE and bodies & set(j.links)]
 
 
-def _keeps(joint: Joint, centre: Array, tolerance: float) -> bool:
+def _is_rotation_about(joint: Joint, centre: Array, tolerance: float) -> bool:
     """Return True if a joint lets its two links only rotate about a centre."""
     match joint.type:
         case JointType.REVOLUTE:
-            return lines.distance(centre, joint.point, joint.axis) <= tolerance
+            return lines.measure_line_distance(centre, joint.point, joint.axis) <= tolerance
         case JointType.UNIVERSAL | JointType.SPHERICAL:
             return bool(np.linalg.norm(joint.point - centre) <= tolerance)
     return joint.type is JointType.FIXED
 
 
-def _flat(joint: Joint, normal: Array, within: float) -> bool:
+def _has_parallel_axis(joint: Joint, normal: Array, within: float) -> bool:
     match joint.type:
         case JointType.REVOLUTE | JointType.PLANAR:
             return bool(np.linalg.norm(np.cross(joint.axis, normal)) <= within)
@@ -153,7 +155,7 @@ def join_halves(graph: JointGraph, given: tuple[Set[str | None], Set[str]] = (fr
             if carrier.type is JointType.FIXED and carrier.links[1] == name and carrier.name not in joints:
                 del graph.joints[carrier.name], graph.links[name]
                 here = closure.links.index(name)
-                X = carrier.ends[0].X @ inverse(carrier.ends[1].X) @ closure.ends[here].X
+                X = carrier.ends[0].X @ invert_pose(carrier.ends[1].X) @ closure.ends[here].X
                 graph.joints[closure.name] = _with_end(closure, here, carrier.links[0], X, closure.line)
     for name in [link for link in graph.links if link.endswith(CUT) and bare(link)]:
         _join(graph, name, bare, joints)
@@ -163,7 +165,7 @@ def _join(graph: JointGraph, name: str, bare: Callable[[str], bool], busy: Set[s
     """Replace the rigid closure by the joint that carries a cut half."""
     own = [joint for joint in graph.joints.values() if name in joint.links]
     stem = name.removesuffix(CUT)
-    counted = [part(stem, k) for k in (1, 2, 3)]
+    counted = [name_chain_joint(stem, k) for k in (1, 2, 3)]
     carriers, welds = ([joint for joint in own if joint.in_tree is in_tree] for in_tree in (True, False))
     if len(carriers) != 1 or len(welds) != 1 or welds[0].type is not JointType.FIXED or carriers[0].links[1] != name:
         return
@@ -180,11 +182,11 @@ def _join(graph: JointGraph, name: str, bare: Callable[[str], bool], busy: Set[s
         or not all(bare(link) and sum(link in joint.links for joint in graph.joints.values()) == 2 for link in between)
     ):
         return
-    whole = _whole(stem, chain, ROUNDED * graph.digits.last_place)
+    whole = _whole(stem, chain, ROUNDED_INCIDENCE_FRACTION * graph.digits.last_place)
     if whole is None:
         return
     here = weld.links.index(name)
-    X = weld.ends[1 - here].X @ inverse(weld.ends[here].X) @ last.ends[1].X
+    X = weld.ends[1 - here].X @ invert_pose(weld.ends[here].X) @ last.ends[1].X
     for joint in (*chain, weld):
         del graph.joints[joint.name]
     for link in (name, *between):
@@ -210,12 +212,12 @@ def _whole(name: str, chain: list[JointSpec], noise: float) -> JointSpec | None:
         return None
     frames = [np.eye(4)]
     for a, b in pairwise(chain):
-        frames.append(frames[-1] @ inverse(a.ends[1].X) @ b.ends[0].X)
-    axes = [unit(X[:3, :3] @ joint.axes[0]) for X, joint in zip(frames, chain, strict=True)]
+        frames.append(frames[-1] @ invert_pose(a.ends[1].X) @ b.ends[0].X)
+    axes = [normalise_vector(X[:3, :3] @ joint.axes[0]) for X, joint in zip(frames, chain, strict=True)]
     wanted = np.ones((2, 2)) if kind is JointType.CYLINDRICAL else np.eye(len(chain))
     points = np.array([X[:3, 3] for X in frames])
-    if np.max(np.abs(points)) > NOISE + noise or np.max(np.abs(np.array(axes) @ np.array(axes).T - wanted)) > (
-        NOISE + noise
+    if np.max(np.abs(points)) > INCIDENCE_TOL + noise or np.max(np.abs(np.array(axes) @ np.array(axes).T - wanted)) > (
+        INCIDENCE_TOL + noise
     ):
         return None
     kept = first.axes[:1] + chain[-1].axes[:1] if kind is JointType.UNIVERSAL else tuple(axes[-1:]) * kind.axes
@@ -224,5 +226,5 @@ def _whole(name: str, chain: list[JointSpec], noise: float) -> JointSpec | None:
 
 
 def _with_end(joint: JointSpec, place: int, link: str, X: Array, line: int | None) -> JointSpec:
-    end = FrameSpec(link, frozen(X), line)
+    end = FrameSpec(link, freeze_array(X), line)
     return replace(joint, ends=(end, joint.ends[1]) if place == 0 else (joint.ends[0], end))

@@ -15,8 +15,8 @@ import numpy as np
 
 from ...mechanism import graphs
 from ...mechanism.model import Joint, JointType, Mechanism, Note
-from ...tolerances import SAME_DIRECTION, SAME_POINT
-from ..tree import is_connected, spanning
+from ...tolerances import DIRECTION_SINE_TOL, POINT_DISTANCE_TOL
+from ..tree import build_spanning_mechanism, is_connected
 from .loops import LoopAssembly
 
 _PLANE = re.compile("PPR|RPP|E")
@@ -27,7 +27,7 @@ _SPACE = re.compile("PPP(S|RRR|UR|RU)|(S|RRR|UR|RU)PPP")
 def without_coordinates(mechanism: Mechanism) -> Mechanism:
     """Replace the only coordinate chain from the base to the platform: in space by a free joint, in a plane by
     nothing."""
-    found = [chain for chain in _chains(mechanism) if _are_coordinates(mechanism, chain)]
+    found = [chain for chain in _chains(mechanism) if _is_free_coordinate_chain(mechanism, chain)]
     if len(found) != 1:
         return mechanism
     (chain,) = found
@@ -48,7 +48,7 @@ def without_coordinates(mechanism: Mechanism) -> Mechanism:
         f"the joints {', '.join(names)} position the platform and constrain nothing: read as "
         + ("a free joint" if in_space else "no leg"),
     )
-    return spanning(replace(rest, notes=(*mechanism.notes, note)))
+    return build_spanning_mechanism(replace(rest, notes=(*mechanism.notes, note)))
 
 
 def mobility(mechanism: Mechanism) -> int:
@@ -59,7 +59,7 @@ def mobility(mechanism: Mechanism) -> int:
 
 def with_weighed_motors(mechanism: Mechanism) -> Mechanism:
     """Add a note if more coordinates have motors than the mobility: files put actuators on passive joints too."""
-    driven = sum(joint.type.freedoms for joint in mechanism.joints.values() if joint.actuated)
+    driven = sum(joint.type.freedoms for joint in mechanism.joints.values() if joint.is_actuated)
     if driven == 0 or all(joint.in_tree for joint in mechanism.joints.values()):
         return mechanism
     free = mobility(mechanism)
@@ -75,8 +75,10 @@ def with_weighed_motors(mechanism: Mechanism) -> Mechanism:
 
 def _chains(mechanism: Mechanism) -> list[list[Joint]]:
     """Return the passive chains from the base's body to the platform's through links with two joints."""
-    bonds = graphs.adjacency(mechanism.links, (j.links for j in mechanism.joints.values() if j.type is JointType.FIXED))
-    base, platform = (graphs.component(bonds, link) for link in (mechanism.base, mechanism.platform))
+    bonds = graphs.build_adjacency(
+        mechanism.links, (j.links for j in mechanism.joints.values() if j.type is JointType.FIXED)
+    )
+    base, platform = (graphs.find_component(bonds, link) for link in (mechanism.base, mechanism.platform))
     busy = {mechanism.reference, *(o.link for o in mechanism.observations)}
     busy |= {o.seen_from for o in mechanism.observations if o.seen_from is not None}
     busy |= {link for c in mechanism.couplings for link in (c.predecessor, c.successor)}
@@ -92,14 +94,14 @@ def _chains(mechanism: Mechanism) -> list[list[Joint]]:
     return found
 
 
-def _are_coordinates(mechanism: Mechanism, chain: Sequence[Joint]) -> bool:
+def _is_free_coordinate_chain(mechanism: Mechanism, chain: Sequence[Joint]) -> bool:
     """Return True if joints are translations in independent directions and rotations about one point, none of them with
     a motor."""
     word = "".join(str(joint.type) for joint in chain)
-    if any(joint.actuated for joint in chain) or not (_PLANE.fullmatch(word) or _SPACE.fullmatch(word)):
+    if any(joint.is_actuated for joint in chain) or not (_PLANE.fullmatch(word) or _SPACE.fullmatch(word)):
         return False
     slides = [joint.axis for joint in chain if joint.type is JointType.PRISMATIC]
     centres = np.array([joint.point for joint in chain if joint.type is not JointType.PRISMATIC])
-    return (not slides or bool(np.linalg.matrix_rank(np.array(slides), SAME_DIRECTION) == len(slides))) and bool(
-        np.max(np.abs(centres - centres[0])) <= SAME_POINT * mechanism.length
+    return (not slides or bool(np.linalg.matrix_rank(np.array(slides), DIRECTION_SINE_TOL) == len(slides))) and bool(
+        np.max(np.abs(centres - centres[0])) <= POINT_DISTANCE_TOL * mechanism.length
     )

@@ -11,17 +11,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...budgets import LOOP_TRIES, NEARBY_AGREED
+from ...budgets import LOOP_ASSEMBLY_TRIES_MAX, SPECIAL_ZERO_SAMPLES_COUNT
 from ...errors import HrsynthError
-from ...geometry.ranks import Rank, range_basis
-from ...geometry.screws import point_velocity
+from ...geometry.ranks import Rank, compute_range_basis
+from ...geometry.screws import compute_point_velocity
 from ...geometry.vectors import Array, hat, transform
 from ...mechanism.legs import decompose
 from ...mechanism.model import Mechanism, Note
-from ...mechanism.normal import normal_form
+from ...mechanism.normal import reduce_to_normal_form
 from ...mechanism.observations.direction import Direction
-from ...mechanism.sensors import defaults_of
-from ...tolerances import RANK_GAP, SOLVED
+from ...mechanism.sensors import list_default_segments
+from ...tolerances import CLOSURE_SOLVER_TOL, RANK_GAP_MIN
 from ..keyframes import STAY
 from .loops import LoopAssembly, Values
 from .zero_configuration import moves, with_zero_at
@@ -55,10 +55,10 @@ def with_generic_zero(mechanism: Mechanism) -> Mechanism:
     if all(joint.in_tree for joint in mechanism.joints.values()):
         return mechanism
     try:
-        decomposition = decompose(normal_form(mechanism).mechanism)
+        decomposition = decompose(reduce_to_normal_form(mechanism).mechanism)
     except HrsynthError:
         return mechanism  # analyses report what is wrong
-    segments = [each for each in defaults_of(decomposition).values() if isinstance(each, Direction)]
+    segments = [each for each in list_default_segments(decomposition).values() if isinstance(each, Direction)]
     if not segments:
         return mechanism
     assembly = LoopAssembly.of(mechanism)
@@ -71,7 +71,7 @@ def with_generic_zero(mechanism: Mechanism) -> Mechanism:
     found: list[tuple[float, float, Values]] = []
     generic: _Ranks | None = None
     rng = np.random.default_rng(0)
-    for number in range(LOOP_TRIES):
+    for number in range(LOOP_ASSEMBLY_TRIES_MAX):
         there = _nearby(assembly, zero, (0.3, 0.15, 0.5)[number % 3], rng)
         if there is None:
             continue
@@ -81,9 +81,9 @@ def with_generic_zero(mechanism: Mechanism) -> Mechanism:
         if clear:
             generic = after
             found.append((_beyond_limits(mechanism, assembly, there), -assembly.rank(there).weakest, there))
-        if len(found) == NEARBY_AGREED:
+        if len(found) == SPECIAL_ZERO_SAMPLES_COUNT:
             break
-    if generic is None or len(found) < NEARBY_AGREED:
+    if generic is None or len(found) < SPECIAL_ZERO_SAMPLES_COUNT:
         return mechanism
     there = min(found, key=lambda each: each[:2])[2]
     labels = tuple(dict.fromkeys(each.leg for each in segments))
@@ -108,23 +108,23 @@ def _ranks(
     platform = (
         V[mechanism.platform]
         if point is None
-        else point_velocity(V[mechanism.platform], transform(X, point / assembly.length))
+        else compute_point_velocity(V[mechanism.platform], transform(X, point / assembly.length))
     )
     rates = [
         -hat(poses[each.link][:3, :3] @ each.direction) @ (V[each.link] - V[mechanism.reference])[3:]
         for each in segments
     ]
-    basis, whole = range_basis(np.vstack([platform, *rates]))
+    basis, whole = compute_range_basis(np.vstack([platform, *rates]))
     rows = len(platform)
     t, u = basis[:rows], basis[rows:]
-    every: list[Rank] = [whole, range_basis(t, 1.0)[1]]
+    every: list[Rank] = [whole, compute_range_basis(t, 1.0)[1]]
     seen = []
     for part in [u, *(u[3 * k : 3 * k + 3] for k in range(len(segments)))] if len(segments) > 1 else [u]:
-        together, alone = range_basis(np.vstack([t, part]), 1.0)[1], range_basis(part, 1.0)[1]
+        together, alone = compute_range_basis(np.vstack([t, part]), 1.0)[1], compute_range_basis(part, 1.0)[1]
         seen.append(every[1].value - (together.value - alone.value))  # dof − dim {t : (t, 0) ∈ ρ}
         every += [together, alone]
     loops = assembly.rank(values)
-    clear = all(each.gap >= RANK_GAP for each in (loops, *every))
+    clear = all(each.gap >= RANK_GAP_MIN for each in (loops, *every))
     return _Ranks(assembly.freedoms(loops), whole.value, every[1].value, tuple(seen)), clear
 
 
@@ -135,7 +135,7 @@ def _nearby(assembly: LoopAssembly, zero: Values, size: float, rng: np.random.Ge
     step *= size / float(np.max(np.abs(step), initial=1e-12))
     ahead = assembly.step(zero, step)
     there, residual = assembly.close(ahead)
-    if residual > 10 * SOLVED or assembly.apart(ahead, there) > assembly.apart(ahead, zero) / 2:
+    if residual > 10 * CLOSURE_SOLVER_TOL or assembly.apart(ahead, there) > assembly.apart(ahead, zero) / 2:
         return None
     loose = {joint.name for joint, _, _ in assembly.tree} - {joint.name for joint in assembly.active}
     return {

@@ -15,22 +15,29 @@ from itertools import combinations
 
 import numpy as np
 
-from ...budgets import FINER_TRIES, LARGEST_RELATED
-from ...errors import BadMechanism, RankBelowRounding, RankUndecided, StructureUndecided
-from ...geometry.gauss_newton import Damping, Residual, descend
-from ...geometry.ranks import singular_decomposition
-from ...geometry.vectors import Array, unit
+from ...budgets import FILE_INCIDENCE_JOINTS_MAX, TOLERANCE_HALVINGS_MAX
+from ...errors import BadMechanism, RoundingLimitedRank, UndecidedRank, UndecidedStructure
+from ...geometry.gauss_newton import DampingFactor, Residual, descend
+from ...geometry.ranks import decompose_matrix
+from ...geometry.vectors import Array, normalise_vector
 from ...mechanism.model import JointType, Mechanism, Note
-from ...mechanism.normal import normal_form
+from ...mechanism.normal import reduce_to_normal_form
 from ...mechanism.observations.direction import SeenAxis
-from ...tolerances import EXACT, NO_FINER, OBLIQUE, RANK_CUTOFF, RANK_GAP, SAME_GEOMETRY
-from ..jointgraph import comma_list
-from ..tree import spanning
+from ...tolerances import (
+    AXIS_MEETING_SINE_MIN,
+    EXACT_INCIDENCE_TOL,
+    GEOMETRY_DIFFERENCE_TOL,
+    RANK_CUTOFF_FRACTION,
+    RANK_GAP_MIN,
+    TOLERANCE_AMBIGUITY_FRACTION,
+)
+from ..jointgraph import join_names
+from ..tree import build_spanning_mechanism
 from .loops import LoopAssembly
 from .relations import Bodies, GeometricRelation, JointCoordinates, certain, of_axes, of_centres
 
 CONTRADICTION = "relations that contradict each other"
-DAMPING = Damping(start=1.0, eased=1.0, least=1.0, most=1e2)
+DAMPING = DampingFactor(start=1.0, eased=1.0, least=1.0, most=1e2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +75,7 @@ class RepairedGeometry:
         for relation in self.mended:
             kinds[relation.kind][relation.of] = None
         found += [
-            Note("merged", f"made to be {kind}: " + "; ".join(comma_list(names, 40) for names in groups))
+            Note("merged", f"made to be {kind}: " + "; ".join(join_names(names, 40) for names in groups))
             for kind, groups in kinds.items()
         ]
         return found
@@ -80,47 +87,54 @@ def snap_geometry(mechanism: Mechanism, residual: float, tolerance: float, possi
 
     Raises
     ------
-    StructureUndecided
+    UndecidedStructure
         For a result that depends on small changes of the tolerance.
-    RankUndecided
+    UndecidedRank
         For loops without a rank gap after the repair.
-    RankBelowRounding
+    RoundingLimitedRank
         For loops whose rank depends on the closure residual alone.
     """
     try:
-        normal_form(mechanism)
+        reduce_to_normal_form(mechanism)
     except BadMechanism:  # a platform that cannot move is reported by analyses of its motion
         return mechanism
     fine = tolerance
-    for _ in range(FINER_TRIES):
+    for _ in range(TOLERANCE_HALVINGS_MAX):
         ideal = nearest(mechanism, fine)
         if ideal is not None:
             break
         fine /= 2.0
     else:
-        raise StructureUndecided(str(mechanism.file), tolerance, _structure(mechanism), CONTRADICTION)
-    if fine < tolerance and ideal.worst > fine / NO_FINER:
-        raise StructureUndecided(str(mechanism.file), fine, _structure(ideal.mechanism), CONTRADICTION)
-    coarse = nearest(mechanism, max(NO_FINER * tolerance, possible), ideal) if fine == tolerance else None
+        raise UndecidedStructure(str(mechanism.file), tolerance, _structure(mechanism), CONTRADICTION)
+    if fine < tolerance and ideal.worst > fine / TOLERANCE_AMBIGUITY_FRACTION:
+        raise UndecidedStructure(str(mechanism.file), fine, _structure(ideal.mechanism), CONTRADICTION)
+    coarse = (
+        nearest(mechanism, max(TOLERANCE_AMBIGUITY_FRACTION * tolerance, possible), ideal)
+        if fine == tolerance
+        else None
+    )
     if coarse is not None and coarse is not ideal:
         one, two = _structure(ideal.mechanism), _structure(coarse.mechanism)
         if one != two:
-            raise StructureUndecided(str(mechanism.file), tolerance, one, two)
+            raise UndecidedStructure(str(mechanism.file), tolerance, one, two)
     meant = LoopAssembly.of(ideal.mechanism)
-    rank, firm = meant.rank(meant.zero()), meant.rank(meant.zero(), max(RANK_CUTOFF, NO_FINER * residual))
-    if rank.gap < RANK_GAP:
-        raise RankUndecided(f"{mechanism.file}: loops with rounded numbers", rank.gap, RANK_GAP)
+    rank, firm = (
+        meant.rank(meant.zero()),
+        meant.rank(meant.zero(), max(RANK_CUTOFF_FRACTION, TOLERANCE_AMBIGUITY_FRACTION * residual)),
+    )
+    if rank.gap < RANK_GAP_MIN:
+        raise UndecidedRank(f"{mechanism.file}: loops with rounded numbers", rank.gap, RANK_GAP_MIN)
     if firm.value != rank.value:
-        raise RankBelowRounding(str(mechanism.file), rank.value - firm.value, residual)
+        raise RoundingLimitedRank(str(mechanism.file), rank.value - firm.value, residual)
     if ideal.mended:
         written = LoopAssembly.of(mechanism)
-        gap = written.rank(written.zero(), max(RANK_CUTOFF, NO_FINER * tolerance)).gap
-        found, notes = spanning(ideal.mechanism), ideal.notes(tolerance, mechanism.length, gap)
+        gap = written.rank(written.zero(), max(RANK_CUTOFF_FRACTION, TOLERANCE_AMBIGUITY_FRACTION * tolerance)).gap
+        found, notes = build_spanning_mechanism(ideal.mechanism), ideal.notes(tolerance, mechanism.length, gap)
     else:
         found, notes = (
             mechanism,
             []
-            if residual <= SAME_GEOMETRY
+            if residual <= GEOMETRY_DIFFERENCE_TOL
             else [
                 Note(
                     "merged",
@@ -137,14 +151,14 @@ def _idealise_directions(mechanism: Mechanism, tolerance: float) -> Mechanism:
     """Return the mechanism with nearly exact observed directions put along segments and axes of their links, or normal
     to axes."""
     found, told = list(mechanism.observations), []
-    if not found or tolerance <= EXACT:
+    if not found or tolerance <= EXACT_INCIDENCE_TOL:
         return mechanism
-    bodies = Bodies(normal_form(mechanism).mechanism)
+    bodies = Bodies(reduce_to_normal_form(mechanism).mechanism)
     for number, seen in enumerate(found):
         if isinstance(seen, SeenAxis) and seen.link in bodies.of:
             R = mechanism.links[seen.link].pose[:3, :3]
             meant = R.T @ _direction(bodies, seen.link, R @ seen.direction, mechanism.length, tolerance)
-            if np.linalg.norm(meant - seen.direction) > EXACT:
+            if np.linalg.norm(meant - seen.direction) > EXACT_INCIDENCE_TOL:
                 found[number] = replace(seen, direction=meant)
                 told.append(f"of leg {seen.leg}")
     note = Note("merged", f"made to be along segments or axes: observed directions {', '.join(told)}")
@@ -160,22 +174,22 @@ def _direction(bodies: Bodies, link: str, d: Array, length: float, tolerance: fl
     lines = [(axis, tolerance) for axis in axes]
     for one, two in combinations(centres, 2):
         size = float(np.linalg.norm(two - one)) / length
-        if size > tolerance / OBLIQUE:
-            lines.append((unit(two - one), tolerance * max(1.0, 1.0 / size)))
+        if size > tolerance / AXIS_MEETING_SINE_MIN:
+            lines.append((normalise_vector(two - one), tolerance * max(1.0, 1.0 / size)))
     misses = [float(np.linalg.norm(np.cross(d, line))) / within for line, within in lines]
     if min(misses, default=np.inf) <= 1.0:
         line, _ = lines[int(np.argmin(misses))]
         return np.asarray(np.copysign(1.0, d @ line) * line)
     square = [axis for axis in axes if abs(float(d @ axis)) <= tolerance]
-    _, s, Vt = singular_decomposition(np.array(square).reshape(-1, 3))
-    across = Vt[s > OBLIQUE]
-    return unit(d - across.T @ (across @ d))
+    _, s, Vt = decompose_matrix(np.array(square).reshape(-1, 3))
+    across = Vt[s > AXIS_MEETING_SINE_MIN]
+    return normalise_vector(d - across.T @ (across @ d))
 
 
 def nearest(mechanism: Mechanism, tolerance: float, known: RepairedGeometry | None = None) -> RepairedGeometry | None:
     """Return the nearest mechanism with all relations that hold to ``tolerance``; None if they contradict each other;
     ``known`` if it has the same ones."""
-    if not 1 < len(mechanism.joints) <= LARGEST_RELATED or tolerance <= EXACT:
+    if not 1 < len(mechanism.joints) <= FILE_INCIDENCE_JOINTS_MAX or tolerance <= EXACT_INCIDENCE_TOL:
         return RepairedGeometry(mechanism)
     bodies = Bodies(mechanism)
     at = JointCoordinates(mechanism, bodies, tolerance)
@@ -185,16 +199,16 @@ def nearest(mechanism: Mechanism, tolerance: float, known: RepairedGeometry | No
         x, normal = known.x, known.normal
     else:
         x, miss = _project(at, held)
-        if miss > EXACT:
+        if miss > EXACT_INCIDENCE_TOL:
             return None
-        normal = normal_form(at.mechanism_of(x)).mechanism
+        normal = reduce_to_normal_form(at.mechanism_of(x)).mechanism
     held += [each for each in of_centres(at, normal, x) if each.defect <= tolerance]
     if known is not None and _names(held) == known.relations:
         return known
     x, miss = _project(at, held)
-    if miss > EXACT:
+    if miss > EXACT_INCIDENCE_TOL:
         return None
-    mended = tuple(each for each in held if each.defect > EXACT)
+    mended = tuple(each for each in held if each.defect > EXACT_INCIDENCE_TOL)
     found = at.mechanism_of(x)
     pairs = [(mechanism.joints[name], joint) for name, joint in found.joints.items()]
     return RepairedGeometry(
@@ -230,7 +244,7 @@ def _project(at: JointCoordinates, relations: Sequence[GeometricRelation]) -> tu
 
     def advance(x: Array, here: Residual, factor: float) -> Array:
         # rows that depend on each other at the solution differ by the residual before it: they are not followed
-        U, s, Vt = singular_decomposition(here.J / weights)
+        U, s, Vt = decompose_matrix(here.J / weights)
         kept = s > max(30 * float(np.max(np.abs(here.error))), 1e-9) * s[0]
         V = Vt[kept].T
         back = weights * (start - x)
@@ -245,6 +259,6 @@ def _structure(mechanism: Mechanism) -> str:
     """Return the joints of the normal form and the mobility, which distinguish two structures."""
     assembly = LoopAssembly.of(mechanism)
     free = sum(joint.kind.freedoms for joint, _, _ in assembly.tree) - assembly.rank(assembly.zero()).value
-    types = sorted(str(joint.type) for joint in normal_form(mechanism).mechanism.joints.values())
+    types = sorted(str(joint.type) for joint in reduce_to_normal_form(mechanism).mechanism.joints.values())
     counts = ", ".join(f"{types.count(each)} {each}" for each in dict.fromkeys(types))
     return f"joints {counts}; mobility {free}"

@@ -12,23 +12,30 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...budgets import FIRMER_BY, HELD_TRIES, LOOP_EFFORT, LOOP_STRIDE, LOOP_TRIES, SINGULAR_STEPS
-from ...geometry.gauss_newton import Damping, Residual, descend
-from ...geometry.ranks import Rank, rank_of, singular_decomposition
-from ...geometry.so3 import quaternions
-from ...geometry.vectors import Array, inverse, pose, unit
+from ...budgets import (
+    FIRMER_ZERO_MIN_FRACTION,
+    FIXED_JOINT_TRIES_COUNT,
+    LOOP_ASSEMBLY_STEP_MAX,
+    LOOP_ASSEMBLY_TRIES_MAX,
+    LOOP_ASSEMBLY_VISITS_MAX,
+    SINGULAR_STEPS,
+)
+from ...geometry.gauss_newton import DampingFactor, Residual, descend
+from ...geometry.ranks import Rank, decompose_matrix, rank_of
+from ...geometry.so3 import convert_to_quaternions
+from ...geometry.vectors import Array, build_pose, invert_pose, normalise_vector
 from ...mechanism.model import JointType, Mechanism
 from ...tolerances import (
-    EXACT,
-    FAINT,
-    LIMIT_MARGIN,
-    NEARLY_SINGULAR,
-    NEWTON_REACH,
-    NOISE,
-    RANK_CUTOFF,
-    RANK_GAP,
-    SOLVED,
-    WITHOUT_DIRECTION,
+    CLOSURE_SOLVER_TOL,
+    EXACT_INCIDENCE_TOL,
+    INCIDENCE_TOL,
+    LIMIT_INSET_MIN,
+    NEARLY_SINGULAR_ZERO_FRACTION,
+    NEWTON_STEP_TO_RESIDUAL_MAX,
+    RANK_CUTOFF_FRACTION,
+    RANK_GAP_MIN,
+    VECTOR_LENGTH_MIN,
+    WEAK_CONSTRAINT_FRACTION,
 )
 from ..jointgraph import (
     ORIGIN,
@@ -37,13 +44,13 @@ from ..jointgraph import (
     JointSpec,
     Posture,
     TreeJoint,
+    build_spanning_tree,
+    compute_zero_poses,
     scale_pose,
-    spanning_tree,
-    zero_poses,
 )
-from ..jointmotion import displacement, opening, screws, step_along, zero
+from ..jointmotion import compute_closure_error, compute_joint_pose, compute_joint_screws, get_zero_value, step_along
 
-DAMPING = Damping(start=1.0, eased=0.1, least=1e-3, most=1e6)
+DAMPING = DampingFactor(start=1.0, eased=0.1, least=1e-3, most=1e6)
 SINGLE = (JointType.REVOLUTE, JointType.PRISMATIC)
 Values = dict[str, Array]
 """Value of every tree joint."""
@@ -56,9 +63,9 @@ class LoopAssembly:
     def __init__(
         self, base: str, joints: Sequence[JointSpec], gears: Sequence[CouplingSpec] = (), start: Posture | None = None
     ) -> None:
-        self.base, self.noise = base, NOISE
+        self.base, self.noise = base, INCIDENCE_TOL
         self._start = start or {}
-        tree = spanning_tree(base, joints)
+        tree = build_spanning_tree(base, joints)
         self.length = _spread(base, tree)
         self.tree = [(_scale(joint, self.length), parent, child) for joint, parent, child in tree]
         used = {joint.name for joint, _, _ in tree}
@@ -84,9 +91,9 @@ class LoopAssembly:
             self.size += joint.kind.freedoms
         self._carried = [self._signs(after) - self._signs(before) for before, after in ways]
         self._ends = [
-            (joint.ends[0].X, inverse(joint.ends[1].X))
+            (joint.ends[0].X, invert_pose(joint.ends[1].X))
             if joint.links[0] == parent
-            else (joint.ends[1].X, inverse(joint.ends[0].X))
+            else (joint.ends[1].X, invert_pose(joint.ends[0].X))
             for joint, parent, _ in self.tree
         ]
         self._last: tuple[Values, dict[str, Array]] | None = None
@@ -114,7 +121,7 @@ class LoopAssembly:
 
     def _at_start(self, joint: JointSpec) -> Array:
         """Return the value of a joint in the keyframe, its lengths in characteristic lengths."""
-        at_zero = zero(joint)
+        at_zero = get_zero_value(joint)
         value = self._start.get(joint.name, at_zero)
         if value.shape != at_zero.shape:
             return at_zero
@@ -130,8 +137,8 @@ class LoopAssembly:
             return self._last[1]
         X = {self.base: np.eye(4)}
         for (joint, parent, child), (near, far) in zip(self.tree, self._ends, strict=True):
-            D = displacement(joint, values[joint.name])
-            X[child] = X[parent] @ near @ (D if joint.links[0] == parent else inverse(D)) @ far
+            D = compute_joint_pose(joint, values[joint.name])
+            X[child] = X[parent] @ near @ (D if joint.links[0] == parent else invert_pose(D)) @ far
         self._last = values, X
         return X
 
@@ -146,10 +153,12 @@ class LoopAssembly:
         X = self.scaled_poses(values)
         twists = np.zeros((6, self.size))
         for joint in self.active:
-            twists[:, self._columns[joint.name]] = np.array(screws(joint, *joint.frames(X))).reshape(-1, 6).T
+            twists[:, self._columns[joint.name]] = (
+                np.array(compute_joint_screws(joint, *joint.frames(X))).reshape(-1, 6).T
+            )
         errors, rows = [np.zeros(0)], [np.zeros((0, self.size))]
         for loop, signs in zip(self.loops, self._carried, strict=True):
-            error, by_twist = opening(loop, *loop.frames(X))
+            error, by_twist = compute_closure_error(loop, *loop.frames(X))
             relative, own = np.zeros((6, self.size)), signs != 0
             relative[:, own] = signs[own] * twists[:, own]
             errors.append(error)
@@ -177,7 +186,9 @@ class LoopAssembly:
             while link != self.base:
                 joint, parent = self._parent[link]
                 sign = 1.0 if joint.links[0] == parent else -1.0
-                twists[:, columns[joint.name]] = sign * np.array(screws(joint, *joint.frames(X))).reshape(-1, 6).T
+                twists[:, columns[joint.name]] = (
+                    sign * np.array(compute_joint_screws(joint, *joint.frames(X))).reshape(-1, 6).T
+                )
                 link = parent
             found[name] = np.hstack([twists[:, : self.size] @ kernel, twists[:, self.size :]])
         return found
@@ -208,13 +219,15 @@ class LoopAssembly:
             nonlocal before
             gain, before = before - at.size, at.size
             stalled = 0 < gain < 1e-6 * at.size and at.size < self.noise
-            return at.size <= SOLVED or stalled or not self.size or self._spent > LOOP_EFFORT
+            return at.size <= CLOSURE_SOLVER_TOL or stalled or not self.size or self._spent > LOOP_ASSEMBLY_VISITS_MAX
 
         def propose(values: Values, at: Residual, factor: float) -> Values:
             return self.step(values, self._damped_step(at, factor))
 
         values, left = descend(values, system, propose, DAMPING, iterations, content)
-        return self._polish(values, left, system) if SOLVED < left.size < self.noise else (values, left.size)
+        return (
+            self._polish(values, left, system) if CLOSURE_SOLVER_TOL < left.size < self.noise else (values, left.size)
+        )
 
     def moving(self, held: Collection[str]) -> Array:
         """Return 1 for active coordinates, 0 for those of fixed joints, (size,)."""
@@ -226,28 +239,28 @@ class LoopAssembly:
         """Plain Newton steps, faint directions too, as long as they are short for the residual that they remove."""
         start = (values, at.size)
         for _ in range(10):
-            step: Array = np.asarray(-np.linalg.lstsq(at.J, at.error, rcond=RANK_CUTOFF)[0], dtype=float)
-            if np.max(np.abs(step), initial=0.0) > NEWTON_REACH * at.size:
+            step: Array = np.asarray(-np.linalg.lstsq(at.J, at.error, rcond=RANK_CUTOFF_FRACTION)[0], dtype=float)
+            if np.max(np.abs(step), initial=0.0) > NEWTON_STEP_TO_RESIDUAL_MAX * at.size:
                 return start
             values = self.step(values, step)
             at = Residual.of(*system(values))
-            if at.size <= SOLVED:
+            if at.size <= CLOSURE_SOLVER_TOL:
                 return values, at.size
         return start
 
     def _damped_step(self, at: Residual, factor: float) -> Array:
         """Return the damped step, no longer than ``LOOP_STRIDE``; near the solution the plain one without weak
         directions."""
-        U, s, Vt = singular_decomposition(at.J)
+        U, s, Vt = decompose_matrix(at.J)
         if at.size < self.noise and factor <= 1.0:
-            kept = s > FAINT * s[0]
+            kept = s > WEAK_CONSTRAINT_FRACTION * s[0]
             step = -(Vt[kept].T @ ((U.T @ at.error)[kept] / s[kept]))
         else:
             step = -(Vt.T @ (s / (s**2 + factor * max(at.size**2, 1e-12)) * (U.T @ at.error)))
         largest = float(np.max(np.abs(step), initial=0.0))
-        return np.asarray(step * min(1.0, LOOP_STRIDE / largest) if largest > 0 else step)
+        return np.asarray(step * min(1.0, LOOP_ASSEMBLY_STEP_MAX / largest) if largest > 0 else step)
 
-    def rank(self, values: Values, cutoff: float = RANK_CUTOFF) -> Rank:
+    def rank(self, values: Values, cutoff: float = RANK_CUTOFF_FRACTION) -> Rank:
         """Return the rank of the constraints of loops and couplings on the joints in loops."""
         return rank_of(np.asarray(np.linalg.svd(self.system(values)[1], compute_uv=False)), cutoff=cutoff)
 
@@ -257,13 +270,15 @@ class LoopAssembly:
 
     def kernel(self, values: Values) -> Array:
         """Return a basis (size, mobility) of the velocities that keep the loops closed."""
-        _, s, Vt = singular_decomposition(self.system(values)[1], full_matrices=True)
-        return np.asarray(Vt[int(np.sum(s > RANK_CUTOFF * max(s, default=1.0))) :].T)
+        _, s, Vt = decompose_matrix(self.system(values)[1], full_matrices=True)
+        return np.asarray(Vt[int(np.sum(s > RANK_CUTOFF_FRACTION * max(s, default=1.0))) :].T)
 
     def worst(self, values: Values) -> tuple[str, float]:
         """Return the loop with the largest closure residual, and this residual."""
         X = self.scaled_poses(values)
-        found = [(float(np.linalg.norm(opening(loop, *loop.frames(X))[0])), loop.name) for loop in self.loops]
+        found = [
+            (float(np.linalg.norm(compute_closure_error(loop, *loop.frames(X))[0])), loop.name) for loop in self.loops
+        ]
         found += [(abs(float(_slip(gear, values)[0])), gear.name) for gear in self.gears]
         miss, name = max(found, default=(0.0, "none"))
         return name, miss
@@ -294,8 +309,8 @@ class LoopAssembly:
                 for bound, far in ((joint.limits.lower, -np.inf), (joint.limits.upper, np.inf))
             )
             value = values.get(joint.name, np.array([closing.get(joint.name, 0.0) / unit]))
-            if lower < upper and not lower - EXACT <= value[0] <= upper + EXACT:
-                inside = min(LIMIT_MARGIN, (upper - lower) / 4)
+            if lower < upper and not lower - EXACT_INCIDENCE_TOL <= value[0] <= upper + EXACT_INCIDENCE_TOL:
+                inside = min(LIMIT_INSET_MIN, (upper - lower) / 4)
                 found[joint.name] = np.clip(value, lower + inside, upper - inside)
         return found
 
@@ -315,21 +330,24 @@ class LoopAssembly:
     def closing(self, values: Values) -> dict[str, float]:
         """Return the distance from their zero (m, rad) of the R and P that close loops: that of a closure is where all
         tree joints are at zero, that of a joint of the file's tree where its two frames meet."""
-        now, then = self.scaled_poses(values), self.scaled_poses({joint.name: zero(joint) for joint, _, _ in self.tree})
+        now, then = (
+            self.scaled_poses(values),
+            self.scaled_poses({joint.name: get_zero_value(joint) for joint, _, _ in self.tree}),
+        )
         found = {}
         for spec in self.loops:
             if spec.kind not in SINGLE:
                 continue
             X, Y = spec.frames(now)
             X_0, Y_0 = spec.frames(then)
-            D, D_0 = inverse(X) @ Y, np.eye(4) if spec.in_tree else inverse(X_0) @ Y_0
-            axis = unit(spec.axes[0])
+            D, D_0 = invert_pose(X) @ Y, np.eye(4) if spec.in_tree else invert_pose(X_0) @ Y_0
+            axis = normalise_vector(spec.axes[0])
             if spec.kind is JointType.PRISMATIC:
                 found[spec.name] = float(axis @ (D[:3, 3] - D_0[:3, 3])) * self.length
             else:
-                turn = quaternions(D[:3, :3] @ D_0[:3, :3].T)
+                turn = convert_to_quaternions(D[:3, :3] @ D_0[:3, :3].T)
                 found[spec.name] = 2 * math.atan2(float(axis @ turn[1:]), float(turn[0]))
-        return {name: q for name, q in found.items() if abs(q) > EXACT}
+        return {name: q for name, q in found.items() if abs(q) > EXACT_INCIDENCE_TOL}
 
     @classmethod
     def of(cls, mechanism: Mechanism) -> LoopAssembly:
@@ -342,7 +360,9 @@ def joints_of(mechanism: Mechanism) -> list[JointSpec]:
     base's."""
     found = []
     for joint in mechanism.joints.values():
-        one, two = (FrameSpec(link, inverse(mechanism.links[link].pose) @ pose(joint.point)) for link in joint.links)
+        one, two = (
+            FrameSpec(link, invert_pose(mechanism.links[link].pose) @ build_pose(joint.point)) for link in joint.links
+        )
         found.append(JointSpec(joint.name, joint.type, (one, two), joint.axes, in_tree=joint.in_tree))
     return found
 
@@ -374,7 +394,7 @@ def solve(assembly: LoopAssembly, seed: int = 0) -> LoopSolution:
     start = assembly.followed(assembly.zero())
     for held in dict.fromkeys((*assembly.leaders, frozenset[str]())):
         rng = np.random.default_rng(seed)
-        for number in range(LOOP_TRIES + 1 if not held else HELD_TRIES):
+        for number in range(LOOP_ASSEMBLY_TRIES_MAX + 1 if not held else FIXED_JOINT_TRIES_COUNT):
             values = start
             if number:
                 push = (0.1, 0.3, 0.6, 1.0)[min(3, (number - 1) // 6)]
@@ -383,7 +403,7 @@ def solve(assembly: LoopAssembly, seed: int = 0) -> LoopSolution:
             found.append(solution)
             if solution.residual <= assembly.noise and not solution.beyond:
                 return solution
-            if any(each.residual <= assembly.noise for each in found) and number >= HELD_TRIES:
+            if any(each.residual <= assembly.noise for each in found) and number >= FIXED_JOINT_TRIES_COUNT:
                 break
     return min(found, key=lambda each: each.residual if each.residual > assembly.noise else 0.0)
 
@@ -393,7 +413,7 @@ def _within_limits(assembly: LoopAssembly, values: Values, held: frozenset[str],
     where the closure residual is smallest."""
     values, residual = assembly.wound(*assembly.close(values, held=held))
     first = LoopSolution(values, residual, pushed, tuple(assembly.beyond(values)))
-    for _ in range(HELD_TRIES if residual <= assembly.noise else 0):
+    for _ in range(FIXED_JOINT_TRIES_COUNT if residual <= assembly.noise else 0):
         inside = {name: value for name, value in assembly.beyond(values).items() if name in values and name not in held}
         if not inside:
             break
@@ -422,25 +442,32 @@ def regular_values(assembly: LoopAssembly, values: Values) -> Values | None:
         there, residual = assembly.close(assembly.step(values, size / float(np.max(np.abs(direction))) * direction))
         rank = assembly.rank(there)
         if (
-            residual <= 10 * SOLVED
-            and rank.gap >= RANK_GAP
-            and (rank.value > here.value or (rank.value == here.value and rank.weakest > FIRMER_BY * here.weakest))
+            residual <= 10 * CLOSURE_SOLVER_TOL
+            and rank.gap >= RANK_GAP_MIN
+            and (
+                rank.value > here.value
+                or (rank.value == here.value and rank.weakest > FIRMER_ZERO_MIN_FRACTION * here.weakest)
+            )
         ):
             found.append((rank.value, rank.weakest, there))
-        return residual <= 10 * SOLVED
+        return residual <= 10 * CLOSURE_SOLVER_TOL
 
     closed = [look(size, kernel @ rng.normal(size=kernel.shape[1])) for size in (0.3, 0.15, 0.5)]
-    if here.weakest > NEARLY_SINGULAR and any(closed) and not any(value > here.value for value, _, _ in found):
+    if (
+        here.weakest > NEARLY_SINGULAR_ZERO_FRACTION
+        and any(closed)
+        and not any(value > here.value for value, _, _ in found)
+    ):
         return None
     every = rng.permutation(kernel @ kernel.T)  # each joint moved, as the loops allow
-    ways = [way for way in every if np.max(np.abs(way)) > WITHOUT_DIRECTION][: LOOP_TRIES // 2]
+    ways = [way for way in every if np.max(np.abs(way)) > VECTOR_LENGTH_MIN][: LOOP_ASSEMBLY_TRIES_MAX // 2]
     for size in SINGULAR_STEPS:
         before = len(found)
         for way in ways:
             look(size, way)
             look(size, -way)
         most = max((value for value, _, _ in found), default=0)
-        firm = [each for each in found[before:] if each[0] == most and each[1] > NEARLY_SINGULAR]
+        firm = [each for each in found[before:] if each[0] == most and each[1] > NEARLY_SINGULAR_ZERO_FRACTION]
         if firm:
             there = max(firm, key=lambda each: each[1])[2]
             return regular_values(assembly, there) or there  # other loops may still be singular
@@ -461,7 +488,7 @@ def _spread(base: str, tree: Sequence[TreeJoint]) -> float:
     """Return the characteristic length (m): mean distance of the joints' centres from their centroid, all at zero."""
     if not tree:
         return 1.0
-    X = zero_poses(base, tree)
+    X = compute_zero_poses(base, tree)
     points = np.array([(X[parent] @ joint.ends[joint.links[0] != parent].X)[:3, 3] for joint, parent, _ in tree])
     spread = float(np.mean(np.linalg.norm(points - np.mean(points, axis=0), axis=1)))
     return spread if spread > 1e-9 else 1.0

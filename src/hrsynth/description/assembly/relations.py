@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...budgets import MOST_RELATED_ON_LINK
+from ...budgets import LINK_INCIDENCE_JOINTS_MAX
 from ...geometry import lines
-from ...geometry.vectors import Array, unit
+from ...geometry.vectors import Array, normalise_vector
 from ...mechanism import graphs
 from ...mechanism.model import Joint, JointType, Mechanism
-from ...tolerances import COMPLEX_STEP, OBLIQUE
+from ...tolerances import AXIS_MEETING_SINE_MIN, COMPLEX_STEP_MAX
 
 LINES = (JointType.REVOLUTE, JointType.CYLINDRICAL)
 BALLS = (JointType.SPHERICAL, JointType.UNIVERSAL)
@@ -48,8 +48,8 @@ class GeometricRelation:
     def gradient(self, x: Array) -> Array:
         """Return its derivative (m, len(x)), by a complex step: Im f(x + ih e) / h, without differences."""
         count = 3 * len(self.at)
-        steps = np.array([x[i : i + 3] for i in self.at]) + 1j * COMPLEX_STEP * np.eye(count).reshape(count, -1, 3)
-        by_coordinate = self.function(*np.moveaxis(steps, 1, 0)).imag.T / COMPLEX_STEP
+        steps = np.array([x[i : i + 3] for i in self.at]) + 1j * COMPLEX_STEP_MAX * np.eye(count).reshape(count, -1, 3)
+        by_coordinate = self.function(*np.moveaxis(steps, 1, 0)).imag.T / COMPLEX_STEP_MAX
         J = np.zeros((len(by_coordinate), len(x)))
         for number, start in enumerate(self.at):
             J[:, start : start + 3] += by_coordinate[:, 3 * number : 3 * number + 3]
@@ -89,7 +89,7 @@ class Bodies:
 
     def __init__(self, mechanism: Mechanism, held: Container[JointType] = (JointType.FIXED,)) -> None:
         fixed = (j.links for j in mechanism.joints.values() if j.type in held)
-        groups = graphs.components(graphs.adjacency(mechanism.links, fixed))
+        groups = graphs.list_components(graphs.build_adjacency(mechanism.links, fixed))
         self.of = {link: number for number, group in enumerate(groups) for link in group}
         self.on: dict[int, list[Joint]] = defaultdict(list)
         for joint in mechanism.joints.values():
@@ -100,7 +100,7 @@ class Bodies:
     def pairs(self) -> Iterator[tuple[Joint, Joint]]:
         """Yield two joints on one body, of bodies with few joints."""
         for joints in self.on.values():
-            if len(joints) <= MOST_RELATED_ON_LINK:
+            if len(joints) <= LINK_INCIDENCE_JOINTS_MAX:
                 yield from combinations(joints, 2)
 
 
@@ -121,7 +121,8 @@ class JointCoordinates:
         for group in _clusters(np.linalg.norm(np.cross(vectors[:, None], vectors[None]), axis=2), within):
             senses = [1.0 if vectors[i] @ vectors[group[0]] > 0 else -1.0 for i in group]
             at = self._add(
-                unit(np.sum([s * vectors[i] for s, i in zip(senses, group, strict=True)], axis=0)), len(group) ** 0.5
+                normalise_vector(np.sum([s * vectors[i] for s, i in zip(senses, group, strict=True)], axis=0)),
+                len(group) ** 0.5,
             )
             self.members[at] = [axes[i] for i in group]
             self.direction.update({axes[i]: (at, s) for s, i in zip(senses, group, strict=True)})
@@ -159,9 +160,9 @@ class JointCoordinates:
                 one.type in LINES
                 and two.type in LINES
                 and self.axis_of(one) != self.axis_of(two)
-                and float(np.linalg.norm(np.cross(one.axis, two.axis))) > OBLIQUE
+                and float(np.linalg.norm(np.cross(one.axis, two.axis))) > AXIS_MEETING_SINE_MIN
             ):
-                ends = lines.common_perpendicular(one.point, one.axis, two.point, two.axis)
+                ends = lines.find_common_perpendicular(one.point, one.axis, two.point, two.axis)
                 if float(np.linalg.norm(ends[1] - ends[0])) <= self.within * length:
                     found.append((ends[0] + ends[1]) / 2 / length)
         balls = [joint for joint in self.mechanism.joints.values() if joint.type in BALLS]
@@ -171,7 +172,11 @@ class JointCoordinates:
         for group in _clusters(apart, 2 * self.within):
             centres = [balls[i] for i in group if i < len(balls)]
             middle = np.mean(points[group], axis=0)
-            through = [j for j in straight if lines.distance(length * middle, j.point, j.axis) <= self.within * length]
+            through = [
+                j
+                for j in straight
+                if lines.measure_line_distance(length * middle, j.point, j.axis) <= self.within * length
+            ]
             if len(centres) + len(through) > 1:
                 at = self.point[centres[0].name] if centres else self._add(middle, 0.1)
                 self.places[at] = [joint.name for joint in (*centres, *through)]
@@ -242,7 +247,7 @@ def of_axes(at: JointCoordinates, bodies: Bodies) -> Iterator[GeometricRelation]
                     yield _perpendicular(at, one.name, two.name, i, j)
     for one, two in bodies.pairs():
         if one.type in LINES and two.type in LINES and at.axis_of(one) == at.axis_of(two):
-            miss = lines.distance(one.point, two.point, two.axis) / length
+            miss = lines.measure_line_distance(one.point, two.point, two.axis) / length
             yield GeometricRelation(
                 "coaxial",
                 (one.name, two.name),
@@ -254,7 +259,7 @@ def of_axes(at: JointCoordinates, bodies: Bodies) -> Iterator[GeometricRelation]
         for name in names:
             joint, place = at.mechanism.joints[name], x[i : i + 3]
             if joint.type in LINES:
-                miss = lines.distance(place, joint.point / length, joint.axis)
+                miss = lines.measure_line_distance(place, joint.point / length, joint.axis)
                 yield GeometricRelation(
                     "through one point", tuple(names), _on_line, (i, at.point[name], at.axis_of(joint)), miss
                 )
@@ -293,7 +298,7 @@ def of_centres(at: JointCoordinates, normal: Mechanism, x: Array) -> Iterator[Ge
 
     start = at.start
     for joints in bodies.on.values():
-        if len(joints) > MOST_RELATED_ON_LINK:
+        if len(joints) > LINK_INCIDENCE_JOINTS_MAX:
             continue
         balls = [joint for joint in joints if joint.type in BALLS]
         axes = {way(axis): joint.name for joint in joints for axis in joint.axes}
@@ -301,7 +306,7 @@ def of_centres(at: JointCoordinates, normal: Mechanism, x: Array) -> Iterator[Ge
             i, j = spot(one), spot(two)
             arm = vector(i) - vector(j)
             size = float(np.linalg.norm(arm))
-            if size <= at.within / OBLIQUE:
+            if size <= at.within / AXIS_MEETING_SINE_MIN:
                 continue
             for a, name in axes.items():
                 names = (one.name, two.name, name)
@@ -316,7 +321,7 @@ def of_centres(at: JointCoordinates, normal: Mechanism, x: Array) -> Iterator[Ge
             places = (spot(one), spot(two), way(slide.axis))
             arm = vector(places[0]) - vector(places[1])
             size = float(np.linalg.norm(arm))
-            if size > at.within / OBLIQUE:
+            if size > at.within / AXIS_MEETING_SINE_MIN:
                 miss = float(np.linalg.norm(np.cross(arm, vector(places[2])))) / max(1.0, size)
                 names = (one.name, two.name, slide.name)
                 yield GeometricRelation("in line with an axis", names, _on_line, places, miss)
@@ -336,7 +341,7 @@ def _flat(
         return
     three = max(combinations(balls, 3), key=area)
     size = area(three)
-    if size <= (within / OBLIQUE) ** 2:
+    if size <= (within / AXIS_MEETING_SINE_MIN) ** 2:
         return
     corners = [i for _, i in three]
     for name, i in balls:

@@ -9,13 +9,13 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ...geometry.so3 import turns_about
-from ...geometry.vectors import Array, frozen, inverse, pose, transform
+from ...geometry.so3 import decompose_rotation
+from ...geometry.vectors import Array, build_pose, freeze_array, invert_pose, transform
 from ...mechanism.model import Joint, JointType, Limits, Mechanism
-from ...tolerances import EXACT, NOISE, SAME_GEOMETRY, SAME_POINT
+from ...tolerances import EXACT_INCIDENCE_TOL, GEOMETRY_DIFFERENCE_TOL, INCIDENCE_TOL, POINT_DISTANCE_TOL
 from .. import numerals, xml
-from ..jointgraph import ORIGIN, comma_list, scale_pose
-from ..jointmotion import displacement
+from ..jointgraph import ORIGIN, join_names, scale_pose
+from ..jointmotion import compute_joint_pose
 from .loops import SINGLE, LoopAssembly, Values
 
 COUNTED_FROM_ZERO = {
@@ -46,9 +46,9 @@ def zeroed_at(
         axes = tuple(Z[:3, :3] @ axis for Z, axis in zip((X, Y), joint.axes, strict=False))
         wrist = None if joint.wrist is None else joint.wrist.carried(X[:3, :3], Y[:3, :3])
         moved = replace(joint, point=X[:3, :3] @ joint.point + X[:3, 3], axes=axes, wrist=wrist)
-        q = np.array([known[joint.name]]) if joint.name in known else _coordinates(joint, inverse(X) @ Y)
+        q = np.array([known[joint.name]]) if joint.name in known else _coordinates(joint, invert_pose(X) @ Y)
         joints.append(
-            _displaced(moved, X @ (ORIGIN if joint.offset is None else joint.offset) @ inverse(Y))
+            _displaced(moved, X @ (ORIGIN if joint.offset is None else joint.offset) @ invert_pose(Y))
             if q is None
             else _counted_from(moved, q)
         )
@@ -72,24 +72,27 @@ def at_file_zero(mechanism: Mechanism) -> Mechanism | None:
                 [assembly.length, 1.0] if joint.type is JointType.CYLINDRICAL else assembly.unit(spec)
             )
             continue
-        centre = pose(joint.point)
-        D = scale_pose(inverse(centre) @ joint.offset @ centre, 1 / assembly.length)
+        centre = build_pose(joint.point)
+        D = scale_pose(invert_pose(centre) @ joint.offset @ centre, 1 / assembly.length)
         values[spec.name] = (
             D
             if joint.type is not JointType.PLANAR
             else np.array(
-                [turns_about(axis[None], D[:3, :3])[0] if K is not None else axis @ D[:3, 3] for axis, K in spec.parts]
+                [
+                    decompose_rotation(axis[None], D[:3, :3])[0] if K is not None else axis @ D[:3, 3]
+                    for axis, K in spec.parts
+                ]
             )
         )
-    return with_zero_at(mechanism, assembly, values) if assembly.worst(values)[1] <= SAME_GEOMETRY else None
+    return with_zero_at(mechanism, assembly, values) if assembly.worst(values)[1] <= GEOMETRY_DIFFERENCE_TOL else None
 
 
 def _coordinates(joint: Joint, D: Array) -> Array | None:
     """Return the coordinates of an R, P, U or C whose successor is displaced by D (4, 4), seen from its predecessor."""
     if joint.type not in (*SINGLE, JointType.UNIVERSAL, JointType.CYLINDRICAL):
         return None
-    slide = [joint.axis @ (transform(D, joint.point) - joint.point)] if joint.type.slides else []
-    turns = np.zeros(0) if joint.type is JointType.PRISMATIC else turns_about(np.array(joint.axes), D[:3, :3])
+    slide = [joint.axis @ (transform(D, joint.point) - joint.point)] if joint.type.has_translation else []
+    turns = np.zeros(0) if joint.type is JointType.PRISMATIC else decompose_rotation(np.array(joint.axes), D[:3, :3])
     limits = [*(each for _, each in joint.turns), *([] if joint.turns else [joint.limits]), None, None]
     return np.array([*slide, *(_within(float(angle), each) for angle, each in zip(turns, limits, strict=False))])
 
@@ -99,18 +102,18 @@ def _within(angle: float, limits: Limits | None) -> float:
     lower = -np.inf if limits is None or limits.lower is None else limits.lower
     upper = np.inf if limits is None or limits.upper is None else limits.upper
     turns = [angle + 2 * np.pi * k for k in (0, 1, -1)]
-    return min(turns, key=lambda each: max(lower - each, each - upper, SAME_POINT))
+    return min(turns, key=lambda each: max(lower - each, each - upper, POINT_DISTANCE_TOL))
 
 
 def _counted_from(joint: Joint, q: Array) -> Joint:
     """Return a joint that counts from its coordinates q (m, rad), its geometry unchanged."""
-    q = np.where(np.abs(q) > EXACT, q, 0.0)
+    q = np.where(np.abs(q) > EXACT_INCIDENCE_TOL, q, 0.0)
     if not q.any():
         return joint
     offset = q if joint.offset is None else q + joint.offset
     moved = replace(
         joint,
-        offset=frozen(offset) if np.abs(offset).max() > EXACT else None,
+        offset=freeze_array(offset) if np.abs(offset).max() > EXACT_INCIDENCE_TOL else None,
         turns=tuple(
             (name, _shifted(limits, float(angle))) for (name, limits), angle in zip(joint.turns, q, strict=False)
         ),
@@ -128,7 +131,7 @@ def _counted_from(joint: Joint, q: Array) -> Joint:
 
 def _displaced(joint: Joint, F: Array) -> Joint:
     """Return a joint whose successor has to be displaced by F (4, 4) to be where the file counts from."""
-    return replace(joint, offset=frozen(F) if np.abs(F - np.eye(4)).max() > EXACT else None)
+    return replace(joint, offset=freeze_array(F) if np.abs(F - np.eye(4)).max() > EXACT_INCIDENCE_TOL else None)
 
 
 def _shifted(limits: Limits | None, q: float) -> Limits | None:
@@ -150,8 +153,8 @@ def with_offsets(joints: Mapping[str, Joint], assembly: LoopAssembly, values: Va
             found[spec.name] = _counted_from(joint, value * unit)
         else:
             X_P = X[spec.links[0]] @ scale_pose(spec.ends[0].X, assembly.length)
-            D = scale_pose(displacement(spec, value), assembly.length)
-            found[spec.name] = _displaced(joint, X_P @ inverse(D) @ inverse(X_P))
+            D = scale_pose(compute_joint_pose(spec, value), assembly.length)
+            found[spec.name] = _displaced(joint, X_P @ invert_pose(D) @ invert_pose(X_P))
     for name, q in assembly.closing(values).items():
         found[name] = _counted_from(joints[name], np.array([q]))
     return found
@@ -172,7 +175,7 @@ def _recount(fragment: str, q: float) -> str:
         return fragment
     element = xml.parse_fragment(fragment)
     count_from(element, q)
-    return xml.canonical(element)
+    return xml.format_canonical(element)
 
 
 def count_from(element: xml.Element, q: float) -> None:
@@ -183,7 +186,7 @@ def count_from(element: xml.Element, q: float) -> None:
         except ValueError:
             continue
         if math.isfinite(value):
-            element.set(key, numerals.exact(value - q))
+            element.set(key, numerals.format_exact(value - q))
 
 
 def moves(assembly: LoopAssembly, values: Values) -> str:
@@ -192,7 +195,7 @@ def moves(assembly: LoopAssembly, values: Values) -> str:
     for joint, _, _ in assembly.tree:
         value = values[joint.name]
         for number, q in enumerate(value if value.ndim == 1 else value[:3, :3][[2, 0, 1], [1, 2, 0]]):
-            if abs(q) > NOISE:
+            if abs(q) > INCIDENCE_TOL:
                 suffix = f"[{number}]" if value.size > 1 else ""
                 found.append(f"{joint.name}{suffix} = {q * assembly.unit(joint):.6g}")
-    return comma_list(found)
+    return join_names(found)

@@ -16,22 +16,22 @@ NATIVE = "native"
 
 
 @cache
-def dialects() -> dict[str, FileFormat]:
+def list_formats() -> dict[str, FileFormat]:
     """Return all formats by name, in the order in which they are tried on a file."""
     folders = [each.name for each in pkgutil.iter_modules(__path__) if each.ispkg]
     found: list[FileFormat] = [import_module(f"{__name__}.{name}").DIALECT for name in folders]
     return {each.name: each for each in sorted(found, key=lambda each: (each.rank, each.name))}
 
 
-def writable() -> list[FileFormat]:
+def list_writable_formats() -> list[FileFormat]:
     """Return the formats that are written, the native one first."""
-    found = (each for each in dialects().values() if each.endings)
+    found = (each for each in list_formats().values() if each.endings)
     return sorted(found, key=lambda each: (each.name != NATIVE, each.name))
 
 
 def read(file: RobotFile) -> JointGraph | Mechanism:
     """Return the content of a file in any format; an unknown format is refused by the native reader."""
-    name = next((name for name, dialect in dialects().items() if dialect.knows(file)), NATIVE)
+    name = next((name for name, dialect in list_formats().items() if dialect.knows(file)), NATIVE)
     reader: Read = import_module(f"{__name__}.{name}.read").read
     robot = reader(file)
     if isinstance(robot, JointGraph):
@@ -40,13 +40,13 @@ def read(file: RobotFile) -> JointGraph | Mechanism:
     return replace(robot, notes=(*file.notes, *robot.notes)) if file.notes else robot
 
 
-def vocabulary(dialect: str) -> Vocabulary:
+def get_vocabulary(dialect: str) -> Vocabulary:
     """Return the names of a format that is XML."""
     found: Vocabulary = import_module(f"{__name__}.{dialect}.names").NAMES
     return found
 
 
-def writer(dialect: str) -> Write:
+def get_writer(dialect: str) -> Write:
     """Return the writer of a format."""
     write: Write = import_module(f"{__name__}.{dialect}.write").write
     return write

@@ -11,9 +11,9 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from lxml import etree
 
-from ...geometry.vectors import Array, frozen, inverse, pose
+from ...geometry.vectors import Array, build_pose, freeze_array, invert_pose
 from ...mechanism.model import JointType
-from ...tolerances import NOISE
+from ...tolerances import INCIDENCE_TOL
 from .. import xml
 from ..elements import XmlReader
 from ..jointgraph import FrameSpec, JointGraph
@@ -30,7 +30,7 @@ DRAKE = ("ball_constraint", "linear_bushing_rpy")
 """Elements of Drake that are closures."""
 
 
-def local(element: xml.Element) -> str:
+def strip_namespace(element: xml.Element) -> str:
     """Return the name of an element without its namespace or prefix."""
     return etree.QName(element).localname.rpartition(":")[2]
 
@@ -41,67 +41,68 @@ def is_drake(element: xml.Element) -> bool:
     return "drake" in space or str(element.tag).startswith("drake:")
 
 
-def _value_of(element: xml.Element, tag: str) -> str | None:
+def _read_child_text(element: xml.Element, tag: str) -> str | None:
     """Return the value of a child element: its ``value`` or ``name`` in URDF, its text in SDFormat."""
-    child = next((each for each in xml.children(element) if local(each) == tag), None)
+    child = next((each for each in xml.list_children(element) if strip_namespace(each) == tag), None)
     if child is None:
         return None
     return (child.get("value") or child.get("name") or child.text or "").strip() or None
 
 
-def _ends(
+def _read_ends(
     reader: XmlReader, element: xml.Element, tags: tuple[str, str], frame_of: Frames
 ) -> tuple[FrameSpec, FrameSpec] | None:
     """Return the two frames that child elements name; an unknown name, or one link twice, is a defect."""
-    line, found = xml.line(element), []
+    line, found = xml.get_line(element), []
     for tag in tags:
-        name = _value_of(element, tag)
+        name = _read_child_text(element, tag)
         frame = None if name is None else frame_of(name)
         if frame is None:
-            reader.defect(line, f"<{local(element)}>: unknown link or frame in <{tag}>", name)
+            reader.defect(line, f"<{strip_namespace(element)}>: unknown link or frame in <{tag}>", name)
         else:
             found.append(frame)
     if len(found) < 2:
         return None
     if found[0].link == found[1].link:
-        reader.defect(line, f"<{local(element)}>: connects a link to itself", found[0].link)
+        reader.defect(line, f"<{strip_namespace(element)}>: connects a link to itself", found[0].link)
         return None
     return found[0], found[1]
 
 
 def read_drake(reader: XmlReader, graph: JointGraph, root: xml.Element, frame_of: Frames) -> None:
     """Add Drake's ball constraints, as points, and its bushings, by the directions of their stiffness."""
-    for element in filter(is_drake, xml.children(root)):
-        match local(element):
+    for element in filter(is_drake, xml.list_children(root)):
+        match strip_namespace(element):
             case "ball_constraint":
-                _ball_constraint(reader, graph, element, frame_of)
+                _read_ball_constraint(reader, graph, element, frame_of)
             case "linear_bushing_rpy":
-                _bushing(reader, graph, element, frame_of)
+                _read_bushing(reader, graph, element, frame_of)
             case name if name.endswith("_constraint"):
                 graph.note(
                     "open",
-                    f"<drake:{name}> (line {xml.line(element)}) is not read; if it connects two links, "
+                    f"<drake:{name}> (line {xml.get_line(element)}) is not read; if it connects two links, "
                     "use --close A@x,y,z:B@x,y,z:TYPE",
                 )
 
 
-def _ball_constraint(reader: XmlReader, graph: JointGraph, element: xml.Element, frame_of: Frames) -> None:
-    ends = _ends(reader, element, ("ball_constraint_body_A", "ball_constraint_body_B"), frame_of)
+def _read_ball_constraint(reader: XmlReader, graph: JointGraph, element: xml.Element, frame_of: Frames) -> None:
+    ends = _read_ends(reader, element, ("ball_constraint_body_A", "ball_constraint_body_B"), frame_of)
     if ends is None:
         return
-    points = (_vector(reader, element, f"ball_constraint_{point}") for point in ("p_AP", "p_BQ"))
+    points = (_read_vector(reader, element, f"ball_constraint_{point}") for point in ("p_AP", "p_BQ"))
     one, two = (
-        FrameSpec(end.link, frozen(end.X @ pose(point)), end.line) for end, point in zip(ends, points, strict=True)
+        FrameSpec(end.link, freeze_array(end.X @ build_pose(point)), end.line)
+        for end, point in zip(ends, points, strict=True)
     )
-    graph.close(graph.fresh("ball_constraint"), JointType.SPHERICAL, (one, two), line=xml.line(element))
+    graph.close(graph.fresh("ball_constraint"), JointType.SPHERICAL, (one, two), line=xml.get_line(element))
 
 
-def _bushing(reader: XmlReader, graph: JointGraph, element: xml.Element, frame_of: Frames) -> None:
+def _read_bushing(reader: XmlReader, graph: JointGraph, element: xml.Element, frame_of: Frames) -> None:
     """Add the loop joint that constrains the directions in which a bushing is stiff, if there is one."""
-    ends = _ends(reader, element, (_BUSHING + "frameA", _BUSHING + "frameC"), frame_of)
+    ends = _read_ends(reader, element, (_BUSHING + "frameA", _BUSHING + "frameC"), frame_of)
     if ends is None:
         return
-    force, torque = (_vector(reader, element, f"{_BUSHING}{what}_stiffness") > 0 for what in ("force", "torque"))
+    force, torque = (_read_vector(reader, element, f"{_BUSHING}{what}_stiffness") > 0 for what in ("force", "torque"))
     free = tuple(int(k) for k in np.flatnonzero(~force)), tuple(int(k) for k in np.flatnonzero(~torque))
     name, links = graph.fresh("bushing"), f"{ends[0].link}:{ends[1].link}"
     kind = {
@@ -120,7 +121,7 @@ def _bushing(reader: XmlReader, graph: JointGraph, element: xml.Element, frame_o
         )
         return
     axis = np.eye(3)[(free[1] or free[0] or (2,))[0]]
-    graph.close(name, kind, ends, [axis], xml.line(element))
+    graph.close(name, kind, ends, [axis], xml.get_line(element))
     graph.note(
         "assumption",
         f"{name!r} between {ends[0].link!r} and {ends[1].link!r} is read as a {kind.name.lower()} "
@@ -128,8 +129,8 @@ def _bushing(reader: XmlReader, graph: JointGraph, element: xml.Element, frame_o
     )
 
 
-def _vector(reader: XmlReader, element: xml.Element, tag: str) -> Array:
-    return reader.values(_value_of(element, tag), (0, 0, 0), xml.line(element), f"<{tag}>")
+def _read_vector(reader: XmlReader, element: xml.Element, tag: str) -> Array:
+    return reader.values(_read_child_text(element, tag), (0, 0, 0), xml.get_line(element), f"<{tag}>")
 
 
 def read_plugins(
@@ -149,7 +150,7 @@ def read_plugins(
             if text in poses
         ]
         if _DETACHABLE.search(title):
-            _detachable(graph, plugin, poses, models)
+            _read_detachable(graph, plugin, poses, models)
         elif len(dict.fromkeys(named)) == 2:
             pair = ":".join(dict.fromkeys(named))
             graph.note(
@@ -165,11 +166,17 @@ def read_plugins(
             )
 
 
-def _detachable(graph: JointGraph, plugin: xml.Element, poses: Mapping[str, Array], models: tuple[str, ...]) -> None:
+def _read_detachable(
+    graph: JointGraph, plugin: xml.Element, poses: Mapping[str, Array], models: tuple[str, ...]
+) -> None:
     parent, child = ((plugin.findtext(f"{end}_link") or "").strip() for end in ("parent", "child"))
     model = (plugin.findtext("child_model") or "").strip()
-    X = inverse(poses[child]) @ poses[parent] if {parent, child} <= set(poses) and parent != child else None
-    if X is not None and model not in ("", "__model__", graph.name, *models) and np.max(np.abs(X - np.eye(4))) > NOISE:
+    X = invert_pose(poses[child]) @ poses[parent] if {parent, child} <= set(poses) and parent != child else None
+    if (
+        X is not None
+        and model not in ("", "__model__", graph.name, *models)
+        and np.max(np.abs(X - np.eye(4))) > INCIDENCE_TOL
+    ):
         graph.note(
             "open",
             f"the detachable joint from {parent!r} to {child!r} of the model {model!r}, which may be "
@@ -183,8 +190,8 @@ def _detachable(graph: JointGraph, plugin: xml.Element, poses: Mapping[str, Arra
             "not two links of this robot",
         )
         return
-    ends = FrameSpec(parent), FrameSpec(child, frozen(X))
-    graph.close(graph.fresh("detachable_joint"), JointType.FIXED, ends, line=xml.line(plugin))
+    ends = FrameSpec(parent), FrameSpec(child, freeze_array(X))
+    graph.close(graph.fresh("detachable_joint"), JointType.FIXED, ends, line=xml.get_line(plugin))
     graph.note(
         "assumption",
         f"the detachable joint of Gazebo fixes {parent!r} and {child!r} at their pose at zero: read as a rigid closure",

@@ -19,7 +19,7 @@ _OTHERS = {"a": "bc", "A": "BC", "1": "203"}
 _KIND = re.compile(r"(?<!\d)(?P<number>[36])d(?![a-z])", re.IGNORECASE)
 
 
-def onshape_pairs(reader: XmlReader, graph: JointGraph, frames: Mapping[str, FrameSpec]) -> None:
+def join_onshape_pairs(reader: XmlReader, graph: JointGraph, frames: Mapping[str, FrameSpec]) -> None:
     """Close frames ``closing_X_1`` and ``closing_X_2``; with ``closing_X_1_z``, ``closing_X_2_z`` as well, by a
     revolute joint. A frame without its partner is a defect."""
     for name, frame in frames.items():
@@ -36,7 +36,7 @@ def onshape_pairs(reader: XmlReader, graph: JointGraph, frames: Mapping[str, Fra
             graph.closing.update({name, partner, f"{name}_z", f"{partner}_z"})
 
 
-def other_pairs(graph: JointGraph, frames: Mapping[str, FrameSpec]) -> None:
+def join_named_pairs(graph: JointGraph, frames: Mapping[str, FrameSpec]) -> None:
     """Close pairs of frames whose names hold a word of closing and differ in one letter or number (A, B or 1, 2), with
     the joint of ``3D`` or ``6D`` in the name, else in a point. If other elements close loops, the pairs are only
     noted."""

@@ -9,9 +9,9 @@ import numpy as np
 from ...description import xml
 from ...errors import HrsynthError
 from ...mechanism.model import Joint, Mechanism
-from ...mechanism.normal import normal_form
-from ...tolerances import SAME_ROBOT
-from ..elements import inertials
+from ...mechanism.normal import reduce_to_normal_form
+from ...tolerances import ROBOT_DIFFERENCE_TOL
+from ..elements import list_inertials
 from ..findings import LintRule, RuleHit
 from ..linted_file import LintedFile
 from ..matching import LinkFit, RobotMatch
@@ -22,82 +22,82 @@ def _match(file: LintedFile) -> RobotMatch | None:
     one, other = file.mechanism, None if file.other is None else file.other.mechanism
     if one is None or other is None:
         return None
-    return file.remember("match", lambda: RobotMatch(_normal(one), _normal(other)))
+    return file.remember("match", lambda: RobotMatch(_normalise_robot(one), _normalise_robot(other)))
 
 
-def _normal(robot: Mechanism) -> Mechanism:
+def _normalise_robot(robot: Mechanism) -> Mechanism:
     try:
-        return normal_form(robot).mechanism
+        return reduce_to_normal_form(robot).mechanism
     except HrsynthError:
         return robot
 
 
-def _fits(file: LintedFile, match: RobotMatch) -> dict[str, LinkFit]:
+def _fit_links(file: LintedFile, match: RobotMatch) -> dict[str, LinkFit]:
     return file.remember("fits", lambda: {link: fit for link in match.one.links if (fit := match.fit(link))})
 
 
-def _pairs(file: LintedFile) -> Iterator[tuple[Joint, Joint]]:
+def _pair_joints(file: LintedFile) -> Iterator[tuple[Joint, Joint]]:
     match = _match(file)
     if match is not None:
         for mine, theirs in match.joints.items():
             yield match.one.joints[mine], match.other.joints[theirs]
 
 
-def _names_of(mine: Joint, theirs: Joint) -> str:
+def _describe_names(mine: Joint, theirs: Joint) -> str:
     return repr(mine.name) if mine.name == theirs.name else f"{mine.name!r} ({theirs.name!r} in the other file)"
 
 
-def _joints(file: LintedFile) -> Iterator[RuleHit]:
+def _compare_joints(file: LintedFile) -> Iterator[RuleHit]:
     match = _match(file)
     if match is None:
         return
     for name, joint in match.one.joints.items():
         if name not in match.joints:
-            yield RuleHit(joint.line, f"{_what(joint)} {name!r} of type {joint.type} is only in this file")
+            yield RuleHit(joint.line, f"{_describe_joint(joint)} {name!r} of type {joint.type} is only in this file")
     taken = set(match.joints.values())
     for name, joint in match.other.joints.items():
         if name not in taken:
-            yield RuleHit(None, f"{_what(joint)} {name!r} of type {joint.type} is only in the other file")
+            yield RuleHit(None, f"{_describe_joint(joint)} {name!r} of type {joint.type} is only in the other file")
 
 
-def _what(joint: Joint) -> str:
+def _describe_joint(joint: Joint) -> str:
     return "joint" if joint.in_tree else "closure"
 
 
-def _types(file: LintedFile) -> Iterator[RuleHit]:
-    for mine, theirs in _pairs(file):
+def _compare_types(file: LintedFile) -> Iterator[RuleHit]:
+    for mine, theirs in _pair_joints(file):
         if mine.type is not theirs.type:
             yield RuleHit(
-                mine.line, f"joint {_names_of(mine, theirs)} is of type {mine.type} here, {theirs.type} there"
+                mine.line, f"joint {_describe_names(mine, theirs)} is of type {mine.type} here, {theirs.type} there"
             )
 
 
-def _ends(file: LintedFile) -> Iterator[RuleHit]:
+def _compare_ends(file: LintedFile) -> Iterator[RuleHit]:
     match = _match(file)
-    for mine, theirs in _pairs(file):
+    for mine, theirs in _pair_joints(file):
         assert match is not None
         here = {match.links.get(link) for link in mine.links}
         if here != set(theirs.links):
             yield RuleHit(
                 mine.line,
-                f"joint {_names_of(mine, theirs)} connects {' and '.join(mine.links)} here, "
+                f"joint {_describe_names(mine, theirs)} connects {' and '.join(mine.links)} here, "
                 f"{' and '.join(theirs.links)} there",
             )
     if match is None:
         return
-    for role in ("base",) if match.one.open_platform or match.other.open_platform else ("base", "platform"):
+    for role in ("base",) if match.one.has_open_platform or match.other.has_open_platform else ("base", "platform"):
         one, two = getattr(match.one, role), getattr(match.other, role)
         if match.links.get(one) != two:
             yield RuleHit(match.one.links[one].line, f"the {role} is {one!r} here, {two!r} there")
 
 
-def _geometry(file: LintedFile) -> Iterator[RuleHit]:
+def _compare_geometry(file: LintedFile) -> Iterator[RuleHit]:
     match = _match(file)
     if match is None:
         return
-    for link, fit in _fits(file, match).items():
+    for link, fit in _fit_links(file, match).items():
         worst = max(fit.misses, key=lambda name: fit.misses[name])
-        if fit.misses[worst] > SAME_ROBOT:
+        if fit.misses[worst] > ROBOT_DIFFERENCE_TOL:
             joint = match.one.joints[worst]
             yield RuleHit(
                 joint.line,
@@ -106,12 +106,12 @@ def _geometry(file: LintedFile) -> Iterator[RuleHit]:
                 f"radians), at joint {worst!r}",
             )
 
-    fits = _fits(file, match)
+    fits = _fit_links(file, match)
     for name in match.joints:
         joint = match.one.joints[name]
-        if all(link in fits and max(fits[link].misses.values()) <= SAME_ROBOT for link in joint.links):
+        if all(link in fits and max(fits[link].misses.values()) <= ROBOT_DIFFERENCE_TOL for link in joint.links):
             apart = match.apart(name)
-            if apart > SAME_ROBOT:
+            if apart > ROBOT_DIFFERENCE_TOL:
                 yield RuleHit(
                     joint.line,
                     f"joint {name!r}: its links are shifted along its axis in the other "
@@ -119,12 +119,14 @@ def _geometry(file: LintedFile) -> Iterator[RuleHit]:
                 )
 
 
-def _zero(file: LintedFile) -> Iterator[RuleHit]:
+def _compare_zero(file: LintedFile) -> Iterator[RuleHit]:
     match = _match(file)
     if match is None:
         return
     fits = {
-        link: fit for link, fit in _fits(file, match).items() if fit.only and max(fit.misses.values()) <= SAME_ROBOT
+        link: fit
+        for link, fit in _fit_links(file, match).items()
+        if fit.only and max(fit.misses.values()) <= ROBOT_DIFFERENCE_TOL
     }
     moved = []
     for name in match.joints:
@@ -136,7 +138,7 @@ def _zero(file: LintedFile) -> Iterator[RuleHit]:
                 float(np.max(np.abs((X - Y) @ np.append(match.other.joints[match.joints[name]].point, 1.0))))
                 / match.one.length,
             )
-            if size > SAME_ROBOT:
+            if size > ROBOT_DIFFERENCE_TOL:
                 moved.append(name)
     if moved:
         yield RuleHit(
@@ -146,74 +148,78 @@ def _zero(file: LintedFile) -> Iterator[RuleHit]:
         )
 
 
-def _senses(file: LintedFile) -> Iterator[RuleHit]:
+def _compare_senses(file: LintedFile) -> Iterator[RuleHit]:
     match = _match(file)
-    for mine, theirs in _pairs(file):
+    for mine, theirs in _pair_joints(file):
         assert match is not None
-        fit = _fits(file, match).get(mine.predecessor)
+        fit = _fit_links(file, match).get(mine.predecessor)
         if fit is None or not fit.only or mine.type is not theirs.type or not mine.axes:
             continue
-        turned = mine.predecessor != _partner(match, theirs)
+        turned = mine.predecessor != _find_partner(match, theirs)
         cosine = float(mine.axis @ fit.X[:3, :3] @ theirs.axis) * (-1 if turned else 1)
-        if mine.in_tree and theirs.in_tree and cosine < -1 + SAME_ROBOT:
-            yield RuleHit(mine.line, f"joint {_names_of(mine, theirs)} counts in the opposite sense in the other file")
+        if mine.in_tree and theirs.in_tree and cosine < -1 + ROBOT_DIFFERENCE_TOL:
+            yield RuleHit(
+                mine.line, f"joint {_describe_names(mine, theirs)} counts in the opposite sense in the other file"
+            )
 
 
-def _partner(match: RobotMatch, theirs: Joint) -> str | None:
+def _find_partner(match: RobotMatch, theirs: Joint) -> str | None:
     """Return the link of one that is the other joint's predecessor."""
     return next((mine for mine, link in match.links.items() if link == theirs.predecessor), None)
 
 
-def _motors(file: LintedFile) -> Iterator[RuleHit]:
-    for mine, theirs in _pairs(file):
-        if mine.actuated != theirs.actuated:
+def _compare_motors(file: LintedFile) -> Iterator[RuleHit]:
+    for mine, theirs in _pair_joints(file):
+        if mine.is_actuated != theirs.is_actuated:
             yield RuleHit(
                 mine.line,
-                f"joint {_names_of(mine, theirs)} is {'actuated' if mine.actuated else 'passive'} here, "
-                f"{'actuated' if theirs.actuated else 'passive'} there",
+                f"joint {_describe_names(mine, theirs)} is {'actuated' if mine.is_actuated else 'passive'} here, "
+                f"{'actuated' if theirs.is_actuated else 'passive'} there",
             )
 
 
-def _limits(file: LintedFile) -> Iterator[RuleHit]:
-    for mine, theirs in _pairs(file):
+def _compare_limits(file: LintedFile) -> Iterator[RuleHit]:
+    for mine, theirs in _pair_joints(file):
         here, there = (
             (None, None) if each.limits is None else (each.limits.lower, each.limits.upper) for each in (mine, theirs)
         )
         if any(
-            (a is None) != (b is None) or (a is not None and abs(a - (b or 0.0)) > SAME_ROBOT * max(1.0, abs(a)))
+            (a is None) != (b is None)
+            or (a is not None and abs(a - (b or 0.0)) > ROBOT_DIFFERENCE_TOL * max(1.0, abs(a)))
             for a, b in zip(here, there, strict=True)
         ):
             yield RuleHit(
-                mine.line, f"joint {_names_of(mine, theirs)}: limits {_range(here)} here, {_range(there)} there"
+                mine.line,
+                f"joint {_describe_names(mine, theirs)}: limits {_format_range(here)} here, {_format_range(there)} there",
             )
 
 
-def _range(limits: tuple[float | None, float | None]) -> str:
+def _format_range(limits: tuple[float | None, float | None]) -> str:
     return "none" if limits == (None, None) else " to ".join("…" if each is None else f"{each:.6g}" for each in limits)
 
 
-def _masses(file: LintedFile) -> Iterator[RuleHit]:
+def _compare_masses(file: LintedFile) -> Iterator[RuleHit]:
     match = _match(file)
     if match is None or file.other is None:
         return
-    theirs = {each.link: each for each in inertials(file.other)}
-    for mine in inertials(file):
+    theirs = {each.link: each for each in list_inertials(file.other)}
+    for mine in list_inertials(file):
         name = mine.link if mine.link in theirs else match.links.get(mine.link)
-        other, line = theirs.get(name or ""), xml.line(mine.element)
+        other, line = theirs.get(name or ""), xml.get_line(mine.element)
         if other is None:
             if theirs:
                 yield RuleHit(line, f"link {mine.link!r} has a mass only in this file")
             continue
         a, b = (None if each.mass is None else each.mass.value for each in (mine, other))
-        if a is not None and b is not None and abs(a - b) > SAME_ROBOT * abs(a):
+        if a is not None and b is not None and abs(a - b) > ROBOT_DIFFERENCE_TOL * abs(a):
             yield RuleHit(line, f"link {mine.link!r}: mass {a:g} here, {b:g} there")
         if mine.inertia is not None and other.inertia is not None:
             moments = [np.linalg.eigvalsh(each) for each in (mine.inertia, other.inertia)]
-            if np.max(np.abs(moments[0] - moments[1])) > SAME_ROBOT * np.max(np.abs(moments[0])):
+            if np.max(np.abs(moments[0] - moments[1])) > ROBOT_DIFFERENCE_TOL * np.max(np.abs(moments[0])):
                 yield RuleHit(line, f"link {mine.link!r}: principal moments of inertia differ")
 
 
-def _gears(file: LintedFile) -> Iterator[RuleHit]:
+def _compare_couplings(file: LintedFile) -> Iterator[RuleHit]:
     match = _match(file)
     if match is None:
         return
@@ -224,7 +230,7 @@ def _gears(file: LintedFile) -> Iterator[RuleHit]:
     theirs = {(each.predecessor, each.successor): each for each in match.other.couplings}
     for ends in dict.fromkeys([*mine, *theirs]):
         a, b = mine.get(ends), theirs.get(ends)
-        if a is None or b is None or abs(a.ratio - b.ratio) > SAME_ROBOT * abs(a.ratio):
+        if a is None or b is None or abs(a.ratio - b.ratio) > ROBOT_DIFFERENCE_TOL * abs(a.ratio):
             words = [
                 "no coupling" if each is None else f"coupling {each.name!r} with the ratio {each.ratio:g}"
                 for each in (a, b)
@@ -232,7 +238,7 @@ def _gears(file: LintedFile) -> Iterator[RuleHit]:
             yield RuleHit(None if a is None else a.line, f"{words[0]} here, {words[1]} there")
 
 
-def _rule(
+def _make_rule(
     name: str,
     severity: str,
     title: str,
@@ -243,39 +249,39 @@ def _rule(
 
 
 RULES = (
-    _rule(
+    _make_rule(
         "joint",
         "error",
         "a joint or closure that one file has",
-        _joints,
+        _compare_joints,
         "It has no partner by name, place or structure. Closures that a format does not have are often lost this way.",
     ),
-    _rule("type", "error", "joints of different types", _types),
-    _rule("ends", "error", "joints between other links, another base or platform", _ends),
-    _rule(
+    _make_rule("type", "error", "joints of different types", _compare_types),
+    _make_rule("ends", "error", "joints between other links, another base or platform", _compare_ends),
+    _make_rule(
         "geometry",
         "error",
         "joints placed differently on a link",
-        _geometry,
+        _compare_geometry,
         "Compared link by link, so it does not matter where the link is at zero, how its frame is placed, or where "
         "along its axis a revolute joint has its origin.",
     ),
-    _rule(
+    _make_rule(
         "zero",
         "warning",
         "a different zero configuration",
-        _zero,
+        _compare_zero,
         "Coordinates of one file are not those of the other: motor offsets, limits and keyframes shift.",
     ),
-    _rule(
+    _make_rule(
         "sense",
         "warning",
         "a joint that counts in the opposite sense",
-        _senses,
+        _compare_senses,
         "A command for one moves the other backwards.",
     ),
-    _rule("motor", "error", "a joint with a motor in one file only", _motors),
-    _rule("limit", "warning", "different limits", _limits, "Measured from the zero of each file."),
-    _rule("mass", "warning", "different masses or inertias", _masses),
-    _rule("coupling", "error", "different couplings", _gears),
+    _make_rule("motor", "error", "a joint with a motor in one file only", _compare_motors),
+    _make_rule("limit", "warning", "different limits", _compare_limits, "Measured from the zero of each file."),
+    _make_rule("mass", "warning", "different masses or inertias", _compare_masses),
+    _make_rule("coupling", "error", "different couplings", _compare_couplings),
 )

@@ -7,15 +7,15 @@ from collections.abc import Iterator
 from ...description import formats
 from ...errors import BadRobotFile, HrsynthError
 from ...mechanism.legs import decompose
-from ...mechanism.normal import normal_form
+from ...mechanism.normal import reduce_to_normal_form
 from ..findings import LintRule, RuleHit
-from ..linted_file import LintedFile, defects_of
+from ..linted_file import LintedFile, list_defects
 
 
-def _unknown(file: LintedFile) -> Iterator[RuleHit]:
+def _find_unknown(file: LintedFile) -> Iterator[RuleHit]:
     if file.root is None or file.dialect is None:
         return
-    for each in formats.vocabulary(file.dialect).unknown(file.root):
+    for each in formats.get_vocabulary(file.dialect).unknown(file.root):
         near, severity = each.remedy, "error" if each.meant else "warning" if each.remedy else None
         yield RuleHit(
             each.line,
@@ -25,14 +25,14 @@ def _unknown(file: LintedFile) -> Iterator[RuleHit]:
         )
 
 
-def _legs(file: LintedFile) -> Iterator[RuleHit]:
+def _find_leg_errors(file: LintedFile) -> Iterator[RuleHit]:
     robot = file.mechanism
     if file.refusal is not None or robot is None or not robot.observations:
         return
     try:
-        decompose(normal_form(robot).mechanism)
+        decompose(reduce_to_normal_form(robot).mechanism)
     except BadRobotFile as error:
-        for line, text in defects_of(error):
+        for line, text in list_defects(error):
             yield RuleHit(line, text)
     except HrsynthError:  # reported by other rules, or by the analyses that need legs
         return
@@ -46,7 +46,7 @@ RULES = (
         "Most readers ignore it silently and use the default of the intended name: an axis along "
         "x, no motor, no limit. hrsynth refuses one that is a misspelling (an error).",
         "nothing, if another program reads it",
-        _unknown,
+        _find_unknown,
     ),
     LintRule(
         "observe-legs",
@@ -55,6 +55,6 @@ RULES = (
         "A link that is in no leg, one label for two legs, two labels for one: the file is read, but commands "
         "that observe legs refuse it.",
         "correct the link or label named in the message",
-        _legs,
+        _find_leg_errors,
     ),
 )

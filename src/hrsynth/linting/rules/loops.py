@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from ...budgets import MOST_LOOP_COORDINATES
+from ...budgets import LOOP_COORDINATES_MAX
 from ...description import numerals, xml
 from ...description.assembly import assumptions
 from ...description.assembly.build import rounding
@@ -15,28 +15,28 @@ from ...description.assembly.candidates import closure_candidates
 from ...description.assembly.loops import LoopAssembly, LoopSolution, Values, solve
 from ...description.assembly.zero_configuration import count_from, moves
 from ...description.jointgraph import JointGraph, JointSpec
-from ...description.jointmotion import displacement, opening
+from ...description.jointmotion import compute_closure_error, compute_joint_pose
 from ...errors import HrsynthError
 from ...mechanism.model import Joint, JointType, Mechanism
-from ...tolerances import EXACT, NO_FINER, NOISE, OPPOSITE
+from ...tolerances import EXACT_INCIDENCE_TOL, INCIDENCE_TOL, OPPOSITE_AXES_TOL, TOLERANCE_AMBIGUITY_FRACTION
 from ..elements import NumberAt
 from ..findings import Fix, LintRule, RuleHit
 from ..freedoms import NearbyFreedoms
 from ..linted_file import LintedFile
-from .names import OWN, removal
+from .names import OWN, remove_element
 
 CLOSING = ("loop", "constraint", "loop_joint", "joint", "connect", "weld", "coupling")
 """Elements that close loops, in any format."""
-LEAST_BETWEEN = 3
+SHORTEST_LOOP_JOINTS_MIN = 3
 """Number of movable joints in the shortest loop, without the one that closes it."""
 
 
-def as_written(file: LintedFile) -> tuple[JointGraph, LoopAssembly] | None:
+def read_loops(file: LintedFile) -> tuple[JointGraph, LoopAssembly] | None:
     """Return the loops of a file before anything is solved, merged or repaired; nothing may change them."""
-    return file.remember("as written", lambda: _as_written(file))
+    return file.remember("as written", lambda: _read_loops(file))
 
 
-def _as_written(file: LintedFile) -> tuple[JointGraph, LoopAssembly] | None:
+def _read_loops(file: LintedFile) -> tuple[JointGraph, LoopAssembly] | None:
     try:
         graph = file.graph()
         file.given.apply(graph)
@@ -45,11 +45,11 @@ def _as_written(file: LintedFile) -> tuple[JointGraph, LoopAssembly] | None:
     base = graph.base or assumptions.base(graph)
     graph.prune(base)
     assembly = LoopAssembly(base, list(graph.joints.values()), graph.gears)
-    return None if max(assembly.size, len(assembly.loops)) > MOST_LOOP_COORDINATES else (graph, assembly)
+    return None if max(assembly.size, len(assembly.loops)) > LOOP_COORDINATES_MAX else (graph, assembly)
 
 
 def _open(file: LintedFile) -> Iterator[RuleHit]:
-    found = as_written(file)
+    found = read_loops(file)
     if found is None:
         return
     graph, assembly = found
@@ -57,15 +57,15 @@ def _open(file: LintedFile) -> Iterator[RuleHit]:
     misses = {}
     for loop in assembly.loops:
         given = graph.joints[loop.name]
-        if not _opposite(given, zero):
-            misses[loop.name] = _miss(given, zero, assembly.length)
+        if not _has_opposite_axes(given, zero):
+            misses[loop.name] = _measure_miss(given, zero, assembly.length)
     worst = max(misses, key=lambda name: misses[name], default=None)
-    if worst is None or misses[worst] <= NOISE or _by_digits(file, graph, assembly):
+    if worst is None or misses[worst] <= INCIDENCE_TOL or _is_explained_by_rounding(file, graph, assembly):
         return
     closed = solve(assembly)
-    size = ", ".join(f"{name!r} by {miss:.3g}" for name, miss in list(misses.items())[:6] if miss > NOISE)
+    size = ", ".join(f"{name!r} by {miss:.3g}" for name, miss in list(misses.items())[:6] if miss > INCIDENCE_TOL)
     text = f"at zero the loops are open: {size} (characteristic lengths, radians)"
-    if closed.residual > NOISE:
+    if closed.residual > INCIDENCE_TOL:
         yield RuleHit(
             graph.joints[worst].line,
             text + f"; no closed configuration was found (residual {closed.residual:.3g})",
@@ -77,42 +77,42 @@ def _open(file: LintedFile) -> Iterator[RuleHit]:
     yield RuleHit(
         graph.joints[worst].line,
         text,
-        _mend_zero(file, graph, assembly, closed),
+        _repair_zero(file, graph, assembly, closed),
         severity="warning" if file.refusal is None else None,
     )
 
 
-def _by_digits(file: LintedFile, graph: JointGraph, assembly: LoopAssembly) -> bool:
+def _is_explained_by_rounding(file: LintedFile, graph: JointGraph, assembly: LoopAssembly) -> bool:
     """Return True if rounded numbers explain the closure residual: geometry repair suffices, no joint has to move."""
     miss = assembly.worst(assembly.zero())[1]
     explained = file.given.tolerance or rounding(graph.digits, assembly.length / graph.unit, miss)
-    return not file.given.as_written and miss <= NO_FINER * explained
+    return not file.given.as_written and miss <= TOLERANCE_AMBIGUITY_FRACTION * explained
 
 
-def _miss(joint: JointSpec, poses: dict[str, np.ndarray], length: float) -> float:
-    error, _ = opening(joint, *joint.frames(poses))
-    gap = 3 - (2 if joint.kind is JointType.PLANAR else 1 if joint.kind.slides else 0)
+def _measure_miss(joint: JointSpec, poses: dict[str, np.ndarray], length: float) -> float:
+    error, _ = compute_closure_error(joint, *joint.frames(poses))
+    gap = 3 - (2 if joint.kind is JointType.PLANAR else 1 if joint.kind.has_translation else 0)
     return float(np.linalg.norm([*(error[:gap] / length), *error[gap:]]))
 
 
-def _mend_zero(file: LintedFile, graph: JointGraph, assembly: LoopAssembly, closed: LoopSolution) -> Fix | None:
+def _repair_zero(file: LintedFile, graph: JointGraph, assembly: LoopAssembly, closed: LoopSolution) -> Fix | None:
     """Return the fix that counts every joint from the closed configuration: its origin takes the displacement, its
     limits and the offset of its mimic lose it."""
     if file.dialect != "urdf" or file.expanded or closed.beyond:
         return None
     moved = []
     for joint, _, _ in assembly.tree:
-        if np.array_equal(displacement(joint, closed.values[joint.name]), np.eye(4)):
+        if np.array_equal(compute_joint_pose(joint, closed.values[joint.name]), np.eye(4)):
             continue
         element = file.element(graph.joints[joint.name].line, "joint", name=joint.name)
         part = OWN.search(joint.name)  # of a chain that is one joint only if its frames stay aligned
         if element is None or part or joint.kind not in (JointType.REVOLUTE, JointType.PRISMATIC):
             return None
         moved.append((joint, element))
-    return partial(_rezero, moved, closed.values, graph, assembly)
+    return partial(_set_zero, moved, closed.values, graph, assembly)
 
 
-def _rezero(
+def _set_zero(
     moved: list[tuple[JointSpec, xml.Element]], values: Values, graph: JointGraph, assembly: LoopAssembly
 ) -> None:
     turned: dict[str | None, float] = {}
@@ -120,13 +120,13 @@ def _rezero(
         joint = graph.joints[scaled.name]
         q = float(values[joint.name][0]) * assembly.unit(scaled)
         turned[joint.name] = q
-        X = joint.ends[0].X @ displacement(joint, np.array([q]))
+        X = joint.ends[0].X @ compute_joint_pose(joint, np.array([q]))
         origin = element.find("origin")
         if origin is None:
             origin = element.makeelement("origin", {})
             element.insert(0, origin)
-        origin.set("xyz", numerals.exact_vector(X[:3, 3]))
-        origin.set("rpy", numerals.exact_vector(numerals.rpy(X[:3, :3])))
+        origin.set("xyz", numerals.format_exact_vector(X[:3, 3]))
+        origin.set("rpy", numerals.format_exact_vector(numerals.compute_rounded_rpy(X[:3, :3])))
         _shift_limits(element, q)
     shifts = assembly.closing(values)
     for element in moved[0][1].getroottree().iter("loop"):
@@ -138,42 +138,42 @@ def _rezero(
             led = (1.0 if ratio is None else ratio) * turned.get(mimic.get("joint"), 0.0)
             if own := turned.get(element.get("name"), 0.0) - led:
                 offset = (NumberAt(mimic, "offset").value or 0.0) - own
-                mimic.set("offset", numerals.exact(offset if abs(offset) > EXACT else 0.0))
+                mimic.set("offset", numerals.format_exact(offset if abs(offset) > EXACT_INCIDENCE_TOL else 0.0))
 
 
 def _shift_limits(element: xml.Element, q: float) -> None:
     """Count the limits and other coordinates of a joint's element from q."""
     for limit in element.iterfind("limit"):
         free = (limit.get("free") or "").split()
-        _less(limit, q, *(key for key in ("lower", "upper") if key not in free))
+        _subtract_value(limit, q, *(key for key in ("lower", "upper") if key not in free))
     for each in element:
         count_from(each, q)
 
 
-def _less(element: xml.Element, q: float, *keys: str) -> None:
+def _subtract_value(element: xml.Element, q: float, *keys: str) -> None:
     for key in keys:
         value = NumberAt(element, key).value
         if value is not None:
-            element.set(key, numerals.exact(value - q))
+            element.set(key, numerals.format_exact(value - q))
 
 
-def _opposite(joint: JointSpec, poses: dict[str, np.ndarray]) -> bool:
+def _has_opposite_axes(joint: JointSpec, poses: dict[str, np.ndarray]) -> bool:
     """Return True if the two axes of a joint are opposite when its frames coincide."""
     if joint.kind not in (JointType.REVOLUTE, JointType.CYLINDRICAL, JointType.PLANAR) or len(joint.axes) != 1:
         return False
     X, Y = joint.frames(poses)
-    return float(X[:3, :3] @ joint.axes[0] @ (Y[:3, :3] @ joint.axes[0])) < -1 + OPPOSITE
+    return float(X[:3, :3] @ joint.axes[0] @ (Y[:3, :3] @ joint.axes[0])) < -1 + OPPOSITE_AXES_TOL
 
 
-def _mirrored(file: LintedFile) -> Iterator[RuleHit]:
-    found = as_written(file)
+def _find_mirrored(file: LintedFile) -> Iterator[RuleHit]:
+    found = read_loops(file)
     if found is None:
         return
     graph, assembly = found
     poses = assembly.poses(assembly.zero())
     for loop in assembly.loops:
         joint = graph.joints[loop.name]
-        if _opposite(joint, poses):
+        if _has_opposite_axes(joint, poses):
             yield RuleHit(joint.line, f"the two axes of {joint.name!r} are opposite at zero", _turn_axis(file, joint))
 
 
@@ -188,26 +188,26 @@ def _turn_axis(file: LintedFile, joint: JointSpec) -> Fix | None:
 
 def _reverse(axis: xml.Element) -> None:
     """Reverse the current axis, which another fix may have changed."""
-    axis.set("xyz", numerals.exact_vector(-numerals.parse(axis.get("xyz", "1 0 0"), 3)))
+    axis.set("xyz", numerals.format_exact_vector(-numerals.parse(axis.get("xyz", "1 0 0"), 3)))
 
 
-def nearby(file: LintedFile) -> NearbyFreedoms | None:
+def sample_nearby(file: LintedFile) -> NearbyFreedoms | None:
     """Return the mobility counts of the file's mechanism, if it was read."""
     robot = file.mechanism
     return None if robot is None else file.remember("freedoms", lambda: NearbyFreedoms(robot))
 
 
-def _dead(file: LintedFile) -> Iterator[RuleHit]:
-    found = nearby(file)
+def _find_immobile(file: LintedFile) -> Iterator[RuleHit]:
+    found = sample_nearby(file)
     for name in [] if found is None else found.dead():
         graph = file.said
-        line = _line(file, name)
+        line = _find_line(file, name)
         own = None if graph is None else graph.joints.get(name)
         element = None if own is not None and own.in_tree else file.element(line, *CLOSING, name=name)
-        yield RuleHit(line, f"{name!r} does not change the mobility", removal(file, element))
+        yield RuleHit(line, f"{name!r} does not change the mobility", remove_element(file, element))
 
 
-def _line(file: LintedFile, name: str) -> int | None:
+def _find_line(file: LintedFile, name: str) -> int | None:
     graph, robot = file.said, file.mechanism
     for table in ({} if graph is None else graph.joints, {} if robot is None else robot.joints):
         if name in table:
@@ -216,8 +216,8 @@ def _line(file: LintedFile, name: str) -> int | None:
     return gears[0].line if gears else None
 
 
-def _redundant(file: LintedFile) -> Iterator[RuleHit]:
-    found = nearby(file)
+def _find_redundant(file: LintedFile) -> Iterator[RuleHit]:
+    found = sample_nearby(file)
     if found is None:
         return
     joints = found.mechanism.joints
@@ -230,7 +230,7 @@ def _redundant(file: LintedFile) -> Iterator[RuleHit]:
     for name, count in found.redundant(rows).items():
         if name not in dead:
             yield RuleHit(
-                _line(file, name),
+                _find_line(file, name),
                 f"{count} of the {rows(name)} constraints of {name!r} are redundant with those of earlier loops",
             )
 
@@ -246,13 +246,13 @@ def is_watched(robot: Mechanism) -> bool:
     return is_unclosed(robot) and (bool(seen) or all(joint.type is JointType.FREE for joint in robot.joints.values()))
 
 
-def _none(file: LintedFile) -> Iterator[RuleHit]:
+def _find_no_loop(file: LintedFile) -> Iterator[RuleHit]:
     robot = file.mechanism
     if robot is not None and is_unclosed(robot) and not is_watched(robot):
         yield RuleHit(None, "the file closes no loop")
 
 
-def _consecutive(graph: JointGraph, one: str, two: str) -> bool:
+def _is_near_in_tree(graph: JointGraph, one: str, two: str) -> bool:
     """Return True if the frames are those of neighbouring joints: fewer than three movable joints are between them, or
     one carries the other, which carries more."""
     carrier = {joint.links[1]: joint for joint in graph.joints.values() if joint.in_tree}
@@ -263,20 +263,20 @@ def _consecutive(graph: JointGraph, one: str, two: str) -> bool:
             way.append(carrier[way[-1]].links[0])
         ways.append(way)
     between = {*ways[0]} ^ {*ways[1]}
-    if sum(carrier[each].kind is not JointType.FIXED for each in between if each in carrier) < LEAST_BETWEEN:
+    if sum(carrier[each].kind is not JointType.FIXED for each in between if each in carrier) < SHORTEST_LOOP_JOINTS_MIN:
         return True
     inner = [tip for tip, way in ((one, ways[1]), (two, ways[0])) if tip in way]
     return any(joint.in_tree and joint.links[0] in {one, two} - {*inner} for joint in graph.joints.values() if inner)
 
 
-def _coincide(file: LintedFile) -> Iterator[RuleHit]:
+def _find_coincident(file: LintedFile) -> Iterator[RuleHit]:
     graph = file.said
     if graph is None:
         return
     held = graph.closing | {link for joint in graph.joints.values() if not joint.in_tree for link in joint.links}
     for each in closure_candidates(graph, graph.base or assumptions.base(file.graph())):
         one, two = each.links
-        if each.coincides and not held & {one, two} and not _consecutive(graph, one, two):
+        if each.coincides and not held & {one, two} and not _is_near_in_tree(graph, one, two):
             yield RuleHit(
                 graph.links[two].line,
                 f"the frames of {one!r} and {two!r} are {1000 * each.distance:.3g} mm "
@@ -303,7 +303,7 @@ RULES = (
         "The joint fits, but aligning the axes rotates a link by 180 degrees: the robot is read as "
         "its mirror image, or not at all.",
         "reverse one of the two axes",
-        _mirrored,
+        _find_mirrored,
         fixable=True,
     ),
     LintRule(
@@ -313,7 +313,7 @@ RULES = (
         "A loop closed twice is overdetermined: solvers of constraint forces have no single solution, and rounded "
         "numbers may lock the loop.",
         "remove it",
-        _dead,
+        _find_immobile,
         fixable=True,
     ),
     LintRule(
@@ -323,7 +323,7 @@ RULES = (
         "Normal in planar and over-constrained loops, and harmless in ideal geometry. Solvers of constraint "
         "forces have no single solution, and rounded numbers may lock the loop.",
         "nothing, or a joint with more dof (spherical instead of revolute)",
-        _redundant,
+        _find_redundant,
     ),
     LintRule(
         "loop-none",
@@ -331,7 +331,7 @@ RULES = (
         "no loop",
         "The closures were perhaps lost in a conversion, or are in a file or launch script next to this one.",
         "close it: --close A:B[:TYPE] with frames A and B that coincide",
-        _none,
+        _find_no_loop,
     ),
     LintRule(
         "frames-coincide",
@@ -340,6 +340,6 @@ RULES = (
         "Several tools mark a loop by two coincident frames on different links; a loop that is not "
         "closed is an open chain.",
         "if they should stay coincident: --close A:B",
-        _coincide,
+        _find_coincident,
     ),
 )

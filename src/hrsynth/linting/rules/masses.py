@@ -11,14 +11,14 @@ from ...description import xml
 from ...geometry.vectors import Array
 from ...mechanism import graphs
 from ...mechanism.model import JointType
-from ...tolerances import NO_BODY
-from ..elements import InertialElement, inertials
+from ...tolerances import NEGATIVE_MOMENT_TOL
+from ..elements import InertialElement, list_inertials
 from ..findings import LintRule, RuleHit
 from ..linted_file import LintedFile
 from .names import OWN
 
 
-def moving(file: LintedFile) -> set[str]:
+def list_moving_links(file: LintedFile) -> set[str]:
     """Return the links that some joint moves: those that are not fixed to the base."""
     graph = file.said
     if graph is None:
@@ -31,69 +31,69 @@ def moving(file: LintedFile) -> set[str]:
     }
 
 
-def _negative(file: LintedFile) -> Iterator[RuleHit]:
-    for each in inertials(file):
+def _find_negative(file: LintedFile) -> Iterator[RuleHit]:
+    for each in list_inertials(file):
         if each.mass is not None and (value := each.mass.value) is not None and value < 0:
             yield RuleHit(
-                xml.line(each.element), f"link {each.link!r} has mass {value:g}", partial(_without_sign, each)
+                xml.get_line(each.element), f"link {each.link!r} has mass {value:g}", partial(_remove_sign, each)
             )
 
 
-def _without_sign(inertial: InertialElement) -> None:
+def _remove_sign(inertial: InertialElement) -> None:
     assert inertial.mass is not None
     inertial.mass.put((inertial.mass.text or "").lstrip("-"))
 
 
-def _zero(file: LintedFile) -> Iterator[RuleHit]:
-    moved = moving(file)
-    for each in inertials(file):
+def _find_zero(file: LintedFile) -> Iterator[RuleHit]:
+    moved = list_moving_links(file)
+    for each in list_inertials(file):
         massless = each.mass is None or each.mass.value == 0
         if massless and each.link in moved and each.inertia is not None and np.any(each.inertia):
-            yield RuleHit(xml.line(each.element), f"link {each.link!r} moves and has an inertia, but no mass")
+            yield RuleHit(xml.get_line(each.element), f"link {each.link!r} moves and has an inertia, but no mass")
 
 
-def second_moments(inertia: Array) -> tuple[Array, Array]:
+def compute_second_moments(inertia: Array) -> tuple[Array, Array]:
     """Return eigenvalues and eigenvectors of ∫ r rᵀ dm = ½ tr(I) 1 − I; a negative eigenvalue breaks the triangle
     inequality of the principal moments."""
     return np.linalg.eigh(np.trace(inertia) / 2 * np.eye(3) - inertia)
 
 
-def _impossible(file: LintedFile) -> Iterator[RuleHit]:
-    for each in inertials(file):
+def _find_impossible(file: LintedFile) -> Iterator[RuleHit]:
+    for each in list_inertials(file):
         if each.inertia is None or not np.any(each.inertia):
             continue
-        values, _ = second_moments(each.inertia)
-        if values[0] < -NO_BODY * float(np.max(np.abs(each.inertia))):
+        values, _ = compute_second_moments(each.inertia)
+        if values[0] < -NEGATIVE_MOMENT_TOL * float(np.max(np.abs(each.inertia))):
             moments = ", ".join(f"{value:.4g}" for value in np.linalg.eigvalsh(each.inertia))
             yield RuleHit(
-                xml.line(each.element),
+                xml.get_line(each.element),
                 f"link {each.link!r}: principal moments {moments}, of which one is "
                 "negative or larger than the two others together",
-                partial(_nearest, each),
+                partial(_set_nearest, each),
             )
 
 
-def _nearest(inertial: InertialElement) -> None:
+def _set_nearest(inertial: InertialElement) -> None:
     """Write the inertia with negative second moments set to zero."""
     assert inertial.inertia is not None
-    values, vectors = second_moments(inertial.inertia)
+    values, vectors = compute_second_moments(inertial.inertia)
     kept = np.maximum(values, 0.0)
-    floor = 2 * NO_BODY * float(np.sum(kept))  # no rounding of the written digits is below zero again
+    floor = 2 * NEGATIVE_MOMENT_TOL * float(np.sum(kept))  # no rounding of the written digits is below zero again
     moments = vectors @ np.diag(np.maximum(kept, floor)) @ vectors.T
     matrix = np.trace(moments) * np.eye(3) - moments
     inertial.write((matrix + matrix.T) / 2)
 
 
-def _missing(file: LintedFile) -> Iterator[RuleHit]:
-    known = {each.link for each in inertials(file)}
+def _find_missing(file: LintedFile) -> Iterator[RuleHit]:
+    known = {each.link for each in list_inertials(file)}
     graph, root = file.said, file.root
     if not known or graph is None or root is None:
         return
-    moved = moving(file)
-    bonds = graphs.adjacency(graph.links, (j.links for j in graph.joints.values() if j.kind is JointType.FIXED))
+    moved = list_moving_links(file)
+    bonds = graphs.build_adjacency(graph.links, (j.links for j in graph.joints.values() if j.kind is JointType.FIXED))
     for name in [name for name in graph.links if name in moved and not OWN.search(name)]:
         line = graph.links[name].line
-        if not known & graphs.component(bonds, name) and file.element(line, "link", "body", name=name) is not None:
+        if not known & graphs.find_component(bonds, name) and file.element(line, "link", "body", name=name) is not None:
             yield RuleHit(
                 line,
                 f"link {name!r} moves without <inertial>, which other links have, and so do the links fixed to it",
@@ -107,7 +107,7 @@ RULES = (
         "negative mass",
         "No body has one: simulators refuse the file, or the robot gains energy.",
         "drop the sign",
-        _negative,
+        _find_negative,
         fixable=True,
     ),
     LintRule(
@@ -116,7 +116,7 @@ RULES = (
         "a moving link with an inertia but no mass",
         "Gazebo drops such links, with their joints; MuJoCo refuses them.",
         "write the link's mass, or omit <inertial> for a link without a body",
-        _zero,
+        _find_zero,
     ),
     LintRule(
         "inertia-triangle",
@@ -125,7 +125,7 @@ RULES = (
         "Principal moments are not negative, and the largest is at most the sum of the two others (triangle "
         "inequality). MuJoCo and Gazebo refuse others; elsewhere simulations blow up.",
         "take the nearest inertia that a body can have: negative second moments set to zero",
-        _impossible,
+        _find_impossible,
         fixable=True,
     ),
     LintRule(
@@ -135,6 +135,6 @@ RULES = (
         "When Gazebo reads a URDF it drops links without <inertial>, with all that is attached to them; MuJoCo "
         "refuses moving bodies without mass.",
         "write the link's mass and inertia",
-        _missing,
+        _find_missing,
     ),
 )

@@ -10,7 +10,7 @@ from functools import partial
 from ...description import xml
 from ...description.chains import CUT, END, TIP
 from ...mechanism import graphs
-from ..elements import joints
+from ..elements import list_joint_elements
 from ..findings import Fix, LintRule, RuleHit
 from ..linted_file import LintedFile
 
@@ -20,17 +20,17 @@ OWN = re.compile(rf"__[123]$|{TIP}$|{CUT}$|{END}$")
 """Suffixes that hrsynth's writers give to a joint and the link that it carries."""
 
 
-def _clash(file: LintedFile) -> Iterator[RuleHit]:
+def _find_clashes(file: LintedFile) -> Iterator[RuleHit]:
     if file.root is None or file.dialect == "mjcf":  # each kind has its own namespace
         return
     links = {each.get("name") for each in file.root.iter("link")}
-    for joint in joints(file):
+    for joint in list_joint_elements(file):
         name = joint.get("name")
         if name in links and not OWN.search(name or ""):
-            yield RuleHit(xml.line(joint), f"{joint.tag} {name!r} has the name of a link")
+            yield RuleHit(xml.get_line(joint), f"{joint.tag} {name!r} has the name of a link")
 
 
-def _case(file: LintedFile) -> Iterator[RuleHit]:
+def _find_case_clashes(file: LintedFile) -> Iterator[RuleHit]:
     graph = file.said
     if graph is None:
         return
@@ -43,14 +43,14 @@ def _case(file: LintedFile) -> Iterator[RuleHit]:
                 )
 
 
-def _reserved(file: LintedFile) -> Iterator[RuleHit]:
+def _find_reserved(file: LintedFile) -> Iterator[RuleHit]:
     graph = file.said
     for name, link in graph.links.items() if graph is not None else ():
         if RESERVED.fullmatch(name) and link.line is not None and graph is not None and name != graph.base:
             yield RuleHit(link.line, f"link {name!r}")
 
 
-def _motors(file: LintedFile) -> Iterator[RuleHit]:
+def _find_motor_names(file: LintedFile) -> Iterator[RuleHit]:
     if file.root is None:
         return
     names = (
@@ -62,16 +62,16 @@ def _motors(file: LintedFile) -> Iterator[RuleHit]:
     for each in names:
         name = each.get("name") if isinstance(each.tag, str) else None
         if name is not None and name in seen:
-            yield RuleHit(xml.line(each), f"motor {name!r}: name already used")
+            yield RuleHit(xml.get_line(each), f"motor {name!r}: name already used")
         seen.add(name or "")
 
 
-def _unused(file: LintedFile) -> Iterator[RuleHit]:
+def _find_unused(file: LintedFile) -> Iterator[RuleHit]:
     graph = file.said
     if graph is None or len(graph.links) < 2:
         return
     parts = sorted(
-        graphs.components(graphs.adjacency(graph.links, (each.links for each in graph.joints.values()))),
+        graphs.list_components(graphs.build_adjacency(graph.links, (each.links for each in graph.joints.values()))),
         key=len,
         reverse=True,
     )
@@ -80,21 +80,23 @@ def _unused(file: LintedFile) -> Iterator[RuleHit]:
             alone = len(part) == 1 and name not in (graph.base, graph.platform)
             element = file.element(graph.links[name].line, "link", name=name) if alone else None
             yield RuleHit(
-                graph.links[name].line, f"link {name!r}: no joint connects it to the others", removal(file, element)
+                graph.links[name].line,
+                f"link {name!r}: no joint connects it to the others",
+                remove_element(file, element),
             )
 
 
-def removal(file: LintedFile, element: xml.Element | None) -> Fix | None:
+def remove_element(file: LintedFile, element: xml.Element | None) -> Fix | None:
     """Return the fix that removes an element; None if another element names it."""
     if element is None:
         return None
-    name, everywhere = element.get("name"), file.remember("words", lambda: Counter(_words(file.root)))
-    if name is not None and everywhere[name] > sum(word == name for word in _words(element)):
+    name, everywhere = element.get("name"), file.remember("words", lambda: Counter(_list_words(file.root)))
+    if name is not None and everywhere[name] > sum(word == name for word in _list_words(element)):
         return None
     return partial(_remove, element)
 
 
-def _words(element: xml.Element | None) -> Iterator[str]:
+def _list_words(element: xml.Element | None) -> Iterator[str]:
     """Yield the values of all attributes and the texts of an element and its descendants."""
     for each in () if element is None else element.iter("*"):
         yield from (*each.attrib.values(), (each.text or "").strip())
@@ -121,7 +123,7 @@ RULES = (
         "URDF allows it. SDFormat has a single namespace and refuses it, and frames with that name are "
         "ambiguous in ROS and Gepetto.",
         "rename one of them, wherever it is referred to",
-        _clash,
+        _find_clashes,
     ),
     LintRule(
         "name-case",
@@ -129,7 +131,7 @@ RULES = (
         "two names that differ in capitals only",
         "People confuse them, and so do file systems where names become file names.",
         "rename one of them",
-        _case,
+        _find_case_clashes,
     ),
     LintRule(
         "name-reserved",
@@ -138,7 +140,7 @@ RULES = (
         "Names with ::, names between double underscores and `world` have special meanings in SDFormat; in "
         "Gazebo, Drake and MuJoCo `world` is the ground.",
         "rename the link",
-        _reserved,
+        _find_reserved,
     ),
     LintRule(
         "motor-name",
@@ -146,7 +148,7 @@ RULES = (
         "two motors with the same name",
         "Controllers find motors by their names.",
         "rename one of them",
-        _motors,
+        _find_motor_names,
     ),
     LintRule(
         "link-unused",
@@ -154,7 +156,7 @@ RULES = (
         "a link that no joint connects",
         "Most readers refuse a second root; hrsynth drops links that are not connected to the base.",
         "remove it, or add its joint",
-        _unused,
+        _find_unused,
         fixable=True,
     ),
 )

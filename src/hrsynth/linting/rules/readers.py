@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 from lxml import etree
 
-from ...description.jointgraph import comma_list
+from ...description.jointgraph import join_names
 from ..findings import LintRule, RuleHit
 from ..linted_file import LintedFile
 
@@ -42,7 +42,7 @@ CONSTRUCTS = {
 TAGS = ("loop", "coupling", "constraint", "loop_joint", "joint", "mimic", "connect", "weld", "plugin")
 
 
-def _construct(file: LintedFile, name: str, line: int | None) -> str | None:
+def _name_construct(file: LintedFile, name: str, line: int | None) -> str | None:
     """Return the construct of a closure in a file."""
     graph = file.said
     if graph is not None and graph.dialect == "Gepetto" and line is None:
@@ -61,7 +61,7 @@ def _construct(file: LintedFile, name: str, line: int | None) -> str | None:
     return f"equality/{element.tag}" if file.dialect == "mjcf" else etree.QName(element).localname
 
 
-def closures(file: LintedFile) -> Iterator[tuple[str, int | None]]:
+def list_file_closures(file: LintedFile) -> Iterator[tuple[str, int | None]]:
     """Yield name and line of the file's loop closures and couplings."""
     graph = file.said
     if graph is None:
@@ -75,17 +75,17 @@ def closures(file: LintedFile) -> Iterator[tuple[str, int | None]]:
         yield gear.name, gear.line
 
 
-def _dropped(file: LintedFile) -> Iterator[RuleHit]:
+def _find_dropped(file: LintedFile) -> Iterator[RuleHit]:
     told: dict[str, list[tuple[str, int | None]]] = {}
-    for name, line in closures(file):
-        construct = _construct(file, name, line) or ""
+    for name, line in list_file_closures(file):
+        construct = _name_construct(file, name, line) or ""
         known = CONSTRUCTS.get(construct, {})
         for program in [each for each in file.readers if known.get(each, READ) != READ]:
             yield RuleHit(line, f"{name!r} ({construct}): {program} {known[program]}", severity="error")
         if not file.readers and any(deed != READ for deed in known.values()):
             told.setdefault(construct, []).append((name, line))
     for construct, every in told.items():
-        names = comma_list((repr(name) for name, _ in every), 4)
+        names = join_names((repr(name) for name, _ in every), 4)
         yield RuleHit(every[0][1], f"{names} ({construct}): {_list_deeds(CONSTRUCTS[construct])}")
 
 
@@ -109,6 +109,6 @@ RULES = (
         "another robot. With --program NAME only that program is considered.",
         "write the file in a format that the program reads: hrsynth convert IN OUT.xml for MuJoCo, OUT.sdf for "
         "Gazebo Classic, OUT.yaml for Gepetto's tools",
-        _dropped,
+        _find_dropped,
     ),
 )

@@ -5,27 +5,27 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 
-from ...errors import BadRequest, LoopsNotClosed
-from ...tolerances import NOISE
+from ...errors import BadRequest, LoopClosureFailure
+from ...tolerances import INCIDENCE_TOL
 from ..findings import LintRule, RuleHit
-from ..linted_file import LintedFile, defects_of
+from ..linted_file import LintedFile, list_defects
 from .geometry import ROUNDED
 
 
-def _refused(file: LintedFile) -> Iterator[RuleHit]:
+def _report_refused(file: LintedFile) -> Iterator[RuleHit]:
     error = file.refusal
     if error is None or isinstance(error, BadRequest):
         return
-    if isinstance(error, LoopsNotClosed) and error.residual > NOISE:  # another rule reports it
+    if isinstance(error, LoopClosureFailure) and error.residual > INCIDENCE_TOL:  # another rule reports it
         return
-    for line, text in defects_of(error):
+    for line, text in list_defects(error):
         yield RuleHit(line, text)
 
 
-def _asks(file: LintedFile) -> Iterator[RuleHit]:
+def _report_assumptions(file: LintedFile) -> Iterator[RuleHit]:
     if isinstance(file.refusal, BadRequest):
         yield RuleHit(None, " ".join(str(file.refusal).removeprefix(f"{file.file}: ").split()))
-    elif file.mechanism is not None and file.mechanism.open_platform:
+    elif file.mechanism is not None and file.mechanism.has_open_platform:
         yield RuleHit(None, str(file.mechanism.choice))
 
 
@@ -54,7 +54,7 @@ RULES = (
         "content that hrsynth refuses",
         "Every command refuses this file with this message.",
         "correct the defect in the message",
-        _refused,
+        _report_refused,
     ),
     LintRule(
         "option-missing",
@@ -62,7 +62,7 @@ RULES = (
         "information that neither the file nor its structure gives",
         "Commands need it as an option.",
         "give the option named in the message",
-        _asks,
+        _report_assumptions,
     ),
     LintRule(
         "assumed",

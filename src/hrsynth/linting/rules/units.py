@@ -7,71 +7,75 @@ from functools import partial
 
 import numpy as np
 
-from ...budgets import LARGEST_ROBOT, SMALLEST_ROBOT, WIDEST_BODY
+from ...budgets import CHARACTERISTIC_LENGTH_MAX_M, CHARACTERISTIC_LENGTH_MIN_M, INERTIA_BODY_WIDTH_MAX
 from ...description import numerals, xml
 from ...geometry.vectors import Array
-from ...tolerances import IN_DEGREES, NEARLY_ONE, TURN_IN_RADIANS, UNIT_AXIS
-from ..elements import NumberAt, inertials, joints, limits
+from ...tolerances import AXIS_LENGTH_TOL, DEGREE_MULTIPLE_MIN, FULL_TURN_RAD, ROUNDED_UNIT_VECTOR_TOL
+from ..elements import NumberAt, list_inertials, list_joint_elements, list_limits
 from ..findings import Fix, LintRule, RuleHit
 from ..linted_file import LintedFile
 
 
-def in_degrees(value: float | None) -> bool:
+def is_in_degrees(value: float | None) -> bool:
     """Return True if an angle that should be in radians looks like one in degrees."""
-    return value is not None and TURN_IN_RADIANS < abs(value) <= 360 and value % IN_DEGREES == 0
+    return value is not None and FULL_TURN_RAD < abs(value) <= 360 and value % DEGREE_MULTIPLE_MIN == 0
 
 
-def _in_radians(value: float | None) -> bool:
+def _is_in_radians(value: float | None) -> bool:
     """Return True if an angle looks like a rounded simple fraction of a full rotation in radians."""
     steps = round((value or 0.0) / numerals.SIMPLE_ANGLE)
     return (
         value is not None
         and steps != 0
-        and not in_degrees(value)
-        and abs(value - steps * numerals.SIMPLE_ANGLE) < NEARLY_ONE
+        and not is_in_degrees(value)
+        and abs(value - steps * numerals.SIMPLE_ANGLE) < ROUNDED_UNIT_VECTOR_TOL
     )
 
 
 def _convert(numbers: list[NumberAt]) -> Fix | None:
     """Return the fix that writes all in radians; None if some already are, as the units are then unknown."""
-    if any(_in_radians(each.value) for each in numbers):
+    if any(_is_in_radians(each.value) for each in numbers):
         return None
 
     def mend() -> None:
         for each in numbers:
-            each.put(numerals.exact(float(np.radians(each.value or 0.0))))
+            each.put(numerals.format_exact(float(np.radians(each.value or 0.0))))
 
     return mend
 
 
-def _limits(file: LintedFile) -> Iterator[RuleHit]:
+def _find_degree_limits(file: LintedFile) -> Iterator[RuleHit]:
     if file.dialect == "mjcf":  # degrees are its default
         return
     every = [
-        (each, [end for end in (each.lower, each.upper) if end is not None]) for each in limits(file) if each.turns
+        (each, [end for end in (each.lower, each.upper) if end is not None])
+        for each in list_limits(file)
+        if each.is_angle
     ]
     numbers = [end.value or 0.0 for _, ends in every for end in ends]
-    whole = any(map(in_degrees, numbers)) and all(value % IN_DEGREES == 0 for value in numbers)
+    whole = any(map(is_in_degrees, numbers)) and all(value % DEGREE_MULTIPLE_MIN == 0 for value in numbers)
     for each, ends in every:
-        sure = any(in_degrees(end.value) for end in ends)
+        sure = any(is_in_degrees(end.value) for end in ends)
         if sure or (whole and any(end.value for end in ends)):
             values = " to ".join(str(end.text) for end in ends)
             beside = "" if sure else ", among others that look like degrees"
-            yield RuleHit(xml.line(each.element), f"joint {each.joint!r}: limits {values} rad{beside}", _convert(ends))
-
-
-def _angles(file: LintedFile) -> Iterator[RuleHit]:
-    for what, element, ends in _turns(file):
-        sure = any(in_degrees(end.value) for end in ends)
-        if sure or any(TURN_IN_RADIANS < abs(end.value or 0.0) <= 360 for end in ends):
             yield RuleHit(
-                xml.line(element),
+                xml.get_line(each.element), f"joint {each.joint!r}: limits {values} rad{beside}", _convert(ends)
+            )
+
+
+def _find_degree_angles(file: LintedFile) -> Iterator[RuleHit]:
+    for what, element, ends in _list_rotations(file):
+        sure = any(is_in_degrees(end.value) for end in ends)
+        if sure or any(FULL_TURN_RAD < abs(end.value or 0.0) <= 360 for end in ends):
+            yield RuleHit(
+                xml.get_line(element),
                 f"rpy {' '.join(str(end.text) for end in ends)}, of {what}",
                 _convert(ends) if sure else None,
             )
 
 
-def _turns(file: LintedFile) -> Iterator[tuple[str, xml.Element, list[NumberAt]]]:
+def _list_rotations(file: LintedFile) -> Iterator[tuple[str, xml.Element, list[NumberAt]]]:
     """Yield all roll, pitch, yaw of a document in radians: owner, element, numbers."""
     for element in file.root.iter() if file.root is not None else ():
         if file.dialect == "urdf" and isinstance(element.tag, str):
@@ -89,48 +93,48 @@ def _turns(file: LintedFile) -> Iterator[tuple[str, xml.Element, list[NumberAt]]
             yield (f"the pose{name}", element, [NumberAt(element, None, place) for place in (3, 4, 5)])
 
 
-def _length(file: LintedFile) -> Iterator[RuleHit]:
+def _find_length_units(file: LintedFile) -> Iterator[RuleHit]:
     robot = file.mechanism
     if robot is None:
         return
-    if robot.length > LARGEST_ROBOT:
+    if robot.length > CHARACTERISTIC_LENGTH_MAX_M:
         yield RuleHit(
             None, f"the joints are {robot.length:.3g} m from their centroid on average, perhaps in millimetres"
         )
-    elif robot.length < SMALLEST_ROBOT:
+    elif robot.length < CHARACTERISTIC_LENGTH_MIN_M:
         yield RuleHit(None, f"the joints are {robot.length:.3g} m from their centroid on average")
 
 
-def _axis(file: LintedFile) -> Iterator[RuleHit]:
-    for joint in joints(file):
+def _find_axis_lengths(file: LintedFile) -> Iterator[RuleHit]:
+    for joint in list_joint_elements(file):
         for axis in joint.iterfind("axis") if file.dialect == "urdf" else ():
-            vector = _vector(axis.get("xyz"))
+            vector = _parse_vector(axis.get("xyz"))
             size = 1.0 if vector is None else float(np.linalg.norm(vector))
-            if vector is not None and size > 0 and abs(size - 1) > UNIT_AXIS:
+            if vector is not None and size > 0 and abs(size - 1) > AXIS_LENGTH_TOL:
                 yield RuleHit(
-                    xml.line(axis),
+                    xml.get_line(axis),
                     f"joint {joint.get('name')!r}: an axis of length {size:.6g}",
-                    partial(axis.set, "xyz", numerals.axis(vector)),
+                    partial(axis.set, "xyz", numerals.format_axis(vector)),
                 )
 
 
-def _vector(text: str | None) -> Array | None:
+def _parse_vector(text: str | None) -> Array | None:
     try:
         return None if text is None else numerals.parse(text, 3)
     except ValueError:
         return None
 
 
-def _inertia(file: LintedFile) -> Iterator[RuleHit]:
+def _find_inertia_units(file: LintedFile) -> Iterator[RuleHit]:
     robot = file.mechanism
-    for each in inertials(file):
+    for each in list_inertials(file):
         mass = None if each.mass is None else each.mass.value
         if robot is None or each.inertia is None or mass is None or mass <= 0:
             continue
         gyration = float(np.sqrt(max(float(np.max(np.linalg.eigvalsh(each.inertia))), 0.0) / mass))
-        if gyration > WIDEST_BODY * robot.length:
+        if gyration > INERTIA_BODY_WIDTH_MAX * robot.length:
             yield RuleHit(
-                xml.line(each.element),
+                xml.get_line(each.element),
                 f"link {each.link!r}: mass {mass:g} kg and the inertia of a body "
                 f"{gyration:.3g} m wide, in a robot of {robot.length:.3g} m",
             )
@@ -143,7 +147,7 @@ RULES = (
         "limits that look like degrees",
         "URDF and SDFormat use radians: 90 rad is 14.3 rotations, so the limit has no effect.",
         "convert them to radians",
-        _limits,
+        _find_degree_limits,
         fixable=True,
     ),
     LintRule(
@@ -152,7 +156,7 @@ RULES = (
         "roll, pitch, yaw that look like degrees",
         "URDF and SDFormat use radians: 90 rad is 14.3 rotations, so the frame is rotated by 116 degrees.",
         "convert them to radians",
-        _angles,
+        _find_degree_angles,
         fixable=True,
     ),
     LintRule(
@@ -161,7 +165,7 @@ RULES = (
         "an implausible size of the robot",
         "Modelling tools export millimetres, readers expect metres.",
         "scale it, or use --unit mm with every command",
-        _length,
+        _find_length_units,
     ),
     LintRule(
         "unit-inertia",
@@ -169,7 +173,7 @@ RULES = (
         "an inertia in another unit than the mass",
         "Tools export kg mm² or g mm². An inertia is at most its mass times the square of the body's extent.",
         "convert the inertia to kg m²",
-        _inertia,
+        _find_inertia_units,
     ),
     LintRule(
         "axis-length",
@@ -177,7 +181,7 @@ RULES = (
         "an axis whose length is not one",
         "hrsynth and most programs use only its direction; some scale the joint's speed by its length.",
         "divide it by its length",
-        _axis,
+        _find_axis_lengths,
         fixable=True,
     ),
 )

@@ -10,7 +10,7 @@ from ..observation import Observation
 
 
 @cache
-def kinds() -> dict[str, type[Observation]]:
+def list_kinds() -> dict[str, type[Observation]]:
     """Return all kinds by name, in the order of their files' names."""
     found = (import_module(f"{__name__}.{module.name}").KIND for module in iter_modules(__path__))
     return {kind.kind: kind for kind in found}

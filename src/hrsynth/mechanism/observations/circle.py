@@ -11,38 +11,40 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...geometry.jets import Jet
-from ...geometry.screws import couple, force, normals
-from ...geometry.vectors import Array, Numbers, frozen
+from ...geometry.screws import find_normals, force, make_couple
+from ...geometry.vectors import Array, Numbers, freeze_array
 from ..cameras import (
     CameraObservation,
     FixedValueLocus,
     ViewGeometry,
     VirtualJoint,
-    apart,
-    gimbal,
-    kept_in,
+    draw_circle,
+    make_angle_locus,
+    make_plane_locus,
+    make_universal,
     normalise_rates,
-    ring,
-    turned_across,
+    require_distance,
 )
-from ..images import tilt_vector
+from ..images import rotate_by_noise
 from ..observation import Drawn
 
 
-def circle_chain(at: ViewGeometry, leg: str) -> tuple[VirtualJoint, ...]:
+def make_circle_chain(at: ViewGeometry, leg: str) -> tuple[VirtualJoint, ...]:
     """Return U̲P̲-U̲-R: five motors, R about the normal."""
-    apart(at, at.B, 0.0, f"circle {leg!r}", "a centre outside of it")
+    require_distance(at, at.B, 0.0, f"circle {leg!r}", "a centre outside of it")
     return (
-        gimbal(at.C, at.ray, at.far, actuated=True),
+        make_universal(at.C, at.ray, at.far, actuated=True),
         VirtualJoint("P", at.C, (at.ray,), True),
-        gimbal(at.B, at.d, None, actuated=True),
+        make_universal(at.B, at.d, None, actuated=True),
         VirtualJoint("R", at.B, (at.d,)),
     )
 
 
-def circle_wrenches(at: ViewGeometry) -> list[Numbers]:
+def make_circle_wrenches(at: ViewGeometry) -> list[Numbers]:
     """Return three forces at the centre, two moments normal to d."""
-    return [force(e, at.B) for e in np.eye(3, dtype=int).astype(at.B.dtype)] + [couple(n) for n in normals(at.d)]
+    return [force(e, at.B) for e in np.eye(3, dtype=int).astype(at.B.dtype)] + [
+        make_couple(n) for n in find_normals(at.d)
+    ]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,7 +57,7 @@ class SpaceCircle(CameraObservation):
     needs = ("at", "axis")
     size = 6
     rank = 5
-    dimension = frozen([1, 1, 1, 0, 0, 0])
+    dimension = freeze_array([1, 1, 1, 0, 0, 0])
     feature_error = "y − y*: of the centre, of the normal"
     found_by = frozenset({"m", "rad"})
 
@@ -78,26 +80,26 @@ class SpaceCircle(CameraObservation):
     def sense(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         """Return the centre with an error, the normal in a cone."""
         return np.concatenate(
-            [value[:3] + noise.get("m", 0.0) * shocks[0], tilt_vector(value[3:], shocks[1], noise.get("rad", 0.0))]
+            [value[:3] + noise.get("m", 0.0) * shocks[0], rotate_by_noise(value[3:], shocks[1], noise.get("rad", 0.0))]
         )
 
     @staticmethod
     def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
         """Return the ray to its centre, a circle about it and its normal."""
-        return Drawn((np.array([0 * p, p]), ring(p, d, size / 2), np.array([p, p + size / 2 * d])))
+        return Drawn((np.array([0 * p, p]), draw_circle(p, d, size / 2), np.array([p, p + size / 2 * d])))
 
     @staticmethod
     def polylines(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
-        return (ring(p, d, size / 2),)
+        return (draw_circle(p, d, size / 2),)
 
     def wrenches(self, at: ViewGeometry) -> list[Numbers]:
-        return circle_wrenches(at)
+        return make_circle_wrenches(at)
 
     def chain(self, at: ViewGeometry) -> tuple[VirtualJoint, ...]:
-        return circle_chain(at, self.leg)
+        return make_circle_chain(at, self.leg)
 
     def loci(self, at: ViewGeometry) -> tuple[FixedValueLocus, ...]:
-        return (kept_in(at.B, at.B, *np.eye(3)), turned_across(at.d, *normals(at.d)))
+        return (make_plane_locus(at.B, at.B, *np.eye(3)), make_angle_locus(at.d, *find_normals(at.d)))
 
     def pointing(self, values: Array) -> Array | None:
         return normalise_rates(values[:, :3])[0]

@@ -12,8 +12,8 @@ import numpy as np
 
 from ...geometry.jets import Jet
 from ...geometry.screws import force
-from ...geometry.vectors import Array, Numbers, plane_axes
-from ..cameras import FixedValueLocus, MetricPoint, ViewGeometry, VirtualJoint, kept_in
+from ...geometry.vectors import Array, Numbers, build_plane_axes
+from ..cameras import FixedValueLocus, MetricPoint, ViewGeometry, VirtualJoint, make_plane_locus
 from ..observation import Drawn
 
 
@@ -57,11 +57,11 @@ class PointDepth(MetricPoint):
         return [force(at.z, at.B)]
 
     def chain(self, at: ViewGeometry) -> tuple[VirtualJoint, ...]:
-        aside = (VirtualJoint("P", at.B, (axis,)) for axis in plane_axes(at.z))
+        aside = (VirtualJoint("P", at.B, (axis,)) for axis in build_plane_axes(at.z))
         return VirtualJoint("P", at.B, (at.z,), actuated=True), *aside, VirtualJoint("S", at.B)
 
     def loci(self, at: ViewGeometry) -> tuple[FixedValueLocus, ...]:
-        return (kept_in(at.B, at.B, at.z),)
+        return (make_plane_locus(at.B, at.B, at.z),)
 
     def pointing(self, values: Array) -> Array | None:
         return None

@@ -13,17 +13,24 @@ from typing import Self
 import numpy as np
 
 from ...errors import BadMechanism
-from ...geometry.screws import couple, normals
-from ...geometry.vectors import Array, Numbers, cross, frozen, hat, unit
-from ..cameras import FixedValueLocus, ViewGeometry, VirtualJoint, gimbal, relative_pose, turned_across
-from ..images import tilt_vector
+from ...geometry.screws import find_normals, make_couple
+from ...geometry.vectors import Array, Numbers, cross, freeze_array, hat, normalise_vector
+from ..cameras import (
+    FixedValueLocus,
+    ViewGeometry,
+    VirtualJoint,
+    compute_relative_pose,
+    make_angle_locus,
+    make_universal,
+)
+from ..images import rotate_by_noise
 from ..observation import Observation, ObservationRecord
 
 
-def axis_chain(at: ViewGeometry) -> tuple[VirtualJoint, ...]:
+def make_axis_chain(at: ViewGeometry) -> tuple[VirtualJoint, ...]:
     """Return PPP-U̲-R(d): T only translates relative to the reference link, so the first axis of U̲ keeps its direction
     there."""
-    turning = gimbal(at.B, at.d, at.far, actuated=True)
+    turning = make_universal(at.B, at.d, at.far, actuated=True)
     first, second = turning.axes
     slides = (VirtualJoint("P", at.B, (axis,)) for axis in (first, second, np.cross(first, second)))
     return (*slides, turning, VirtualJoint("R", at.B, (at.d,)))
@@ -48,7 +55,7 @@ class SeenAxis(Observation):
 
     def __post_init__(self) -> None:
         try:
-            object.__setattr__(self, "direction", frozen(unit(self.direction)))
+            object.__setattr__(self, "direction", freeze_array(normalise_vector(self.direction)))
         except ValueError:
             raise BadMechanism(f"observation of leg {self.leg!r}: direction", "0 0 0", "a non-zero vector") from None
 
@@ -71,14 +78,14 @@ class SeenAxis(Observation):
 
     def sense(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         """Return a direction in a cone about u."""
-        return tilt_vector(value, shocks[0], noise["rad"])
+        return rotate_by_noise(value, shocks[0], noise["rad"])
 
     @classmethod
     def together(
         cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array, V_links: Array
     ) -> tuple[Array, Array]:
         seen = X_reference[..., :3, :3].swapaxes(-1, -2)
-        u = np.matmul(X_links[..., :3, :3], _directions(tuple(observations)))[..., 0]
+        u = np.matmul(X_links[..., :3, :3], _stack_directions(tuple(observations)))[..., 0]
         across = np.zeros((*u.shape, 3))
         across[..., 0, 1], across[..., 1, 2], across[..., 2, 0] = u[..., 2], u[..., 0], u[..., 1]
         across -= across.swapaxes(-1, -2)
@@ -91,7 +98,7 @@ class SeenAxis(Observation):
     @property
     def view(self) -> Array:
         """Frame of the value (4, 4), in the reference link's."""
-        return frozen(np.eye(4))
+        return freeze_array(np.eye(4))
 
     def sighting(self, X_reference: Array, X_link: Array, far: Array | None = None) -> ViewGeometry:
         """Return the geometry of links and axis in the base frame."""
@@ -99,14 +106,14 @@ class SeenAxis(Observation):
 
     def wrenches(self, at: ViewGeometry) -> list[Numbers]:
         """Return two moments normal to u."""
-        return [couple(n) for n in normals(at.d)]
+        return [make_couple(n) for n in find_normals(at.d)]
 
     def chain(self, at: ViewGeometry) -> tuple[VirtualJoint, ...]:
         """PPP-U̲-R(d)."""
-        return axis_chain(at)
+        return make_axis_chain(at)
 
     def loci(self, at: ViewGeometry) -> tuple[FixedValueLocus, ...]:
-        return (turned_across(at.d, *normals(at.d)),)
+        return (make_angle_locus(at.d, *find_normals(at.d)),)
 
     def pointing(self, values: Array) -> Array | None:
         """Return the part of values (n, 3) that the chain's first U rotates: all."""
@@ -115,7 +122,7 @@ class SeenAxis(Observation):
     def carried_by(self, into: Mapping[str, str], poses: Mapping[str, Array]) -> Self:
         if into[self.link] == self.link:
             return super().carried_by(into, poses)
-        turned = relative_pose(self.link, into, poses)[:3, :3] @ self.direction
+        turned = compute_relative_pose(self.link, into, poses)[:3, :3] @ self.direction
         return replace(super().carried_by(into, poses), direction=turned)
 
     def to_dict(self) -> ObservationRecord:
@@ -137,14 +144,14 @@ class Direction(SeenAxis):
     needs = ("axis",)
 
     @property
-    def by_segment(self) -> bool:
+    def is_segment_direction(self) -> bool:
         return self.seen_from is None
 
 
 @lru_cache(maxsize=512)
-def _directions(observations: tuple[Observation, ...]) -> Array:
+def _stack_directions(observations: tuple[Observation, ...]) -> Array:
     """Return the directions (k, 3, 1) of observations, in their links."""
-    return frozen([o.direction[:, None] for o in observations if isinstance(o, SeenAxis)])
+    return freeze_array([o.direction[:, None] for o in observations if isinstance(o, SeenAxis)])
 
 
 KIND = Direction

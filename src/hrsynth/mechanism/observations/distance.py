@@ -12,9 +12,18 @@ import numpy as np
 
 from ...geometry import components
 from ...geometry.jets import Jet
-from ...geometry.screws import force, normals
-from ...geometry.vectors import Array, Numbers, unit
-from ..cameras import FixedValueLocus, MetricPoint, ViewGeometry, VirtualJoint, apart, gimbal, normalise_rates, ring
+from ...geometry.screws import find_normals, force
+from ...geometry.vectors import Array, Numbers, normalise_vector
+from ..cameras import (
+    FixedValueLocus,
+    MetricPoint,
+    ViewGeometry,
+    VirtualJoint,
+    draw_circle,
+    make_universal,
+    normalise_rates,
+    require_distance,
+)
 from ..observation import Drawn
 
 
@@ -44,8 +53,11 @@ class PointDistance(MetricPoint):
     @staticmethod
     def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
         """Return the ray, and arcs of the sphere at its end."""
-        arcs = (ring(0 * p, unit(across), float(np.linalg.norm(p))) for across in normals(unit(p)))
-        near = (arc[arc @ unit(p) > np.cos(0.2) * np.linalg.norm(p)] for arc in arcs)
+        arcs = (
+            draw_circle(0 * p, normalise_vector(across), float(np.linalg.norm(p)))
+            for across in find_normals(normalise_vector(p))
+        )
+        near = (arc[arc @ normalise_vector(p) > np.cos(0.2) * np.linalg.norm(p)] for arc in arcs)
         return Drawn((np.array([0 * p, p]), *(np.array(sorted(arc, key=tuple)) for arc in near if len(arc) > 1)))
 
     @staticmethod
@@ -56,8 +68,12 @@ class PointDistance(MetricPoint):
         return [force(at.B - at.C, at.B)]
 
     def chain(self, at: ViewGeometry) -> tuple[VirtualJoint, ...]:
-        apart(at, at.B, 0.0, f"distance {self.leg!r}", "a point outside of it")
-        return gimbal(at.C, at.ray, None), VirtualJoint("P", at.C, (at.ray,), actuated=True), VirtualJoint("S", at.B)
+        require_distance(at, at.B, 0.0, f"distance {self.leg!r}", "a point outside of it")
+        return (
+            make_universal(at.C, at.ray, None),
+            VirtualJoint("P", at.C, (at.ray,), actuated=True),
+            VirtualJoint("S", at.B),
+        )
 
     def loci(self, at: ViewGeometry) -> tuple[FixedValueLocus, ...]:
         return (FixedValueLocus(at.B, np.zeros((0, 3)), at.C, float(np.linalg.norm(at.B - at.C))),)

@@ -8,10 +8,10 @@ from typing import Self
 
 import numpy as np
 
-from ...geometry.screws import point_velocity
+from ...geometry.screws import compute_point_velocity
 from ...geometry.so3 import wrap_angle
-from ...geometry.vectors import Array, cross, transform, unit
-from ..cameras import relative_pose
+from ...geometry.vectors import Array, cross, normalise_vector, transform
+from ..cameras import compute_relative_pose
 from ..observation import Drawn, Observation, ObservationRecord
 
 
@@ -55,7 +55,7 @@ class AngleEncoder(Encoder):
     start: Array
 
     def carried_by(self, into: Mapping[str, str], poses: Mapping[str, Array]) -> Self:
-        R, R_c = (relative_pose(link, into, poses)[:3, :3] for link in (self.link, str(self.seen_from)))
+        R, R_c = (compute_relative_pose(link, into, poses)[:3, :3] for link in (self.link, str(self.seen_from)))
         axis, start = R_c @ self.axis, R_c @ self.start
         return replace(super().carried_by(into, poses), axis=axis, mark=R @ self.mark, start=start)
 
@@ -75,7 +75,7 @@ class AngleEncoder(Encoder):
     def draw(self, X_reference: Array, X_link: Array, size: float) -> Drawn:
         """Return an arc about the axis, at the link's frame, from its mark at zero to its mark now."""
         turn, R = float(self.value(X_reference, X_link)[0]), X_reference[:3, :3]
-        spoke = unit(self.start - (self.axis @ self.start) * self.axis)
+        spoke = normalise_vector(self.start - (self.axis @ self.start) * self.axis)
         turns = np.linspace(0, turn, 17)[:, None]
         arc = np.cos(turns) * spoke + np.sin(turns) * cross(self.axis, spoke)
         return Drawn((X_link[:3, 3] + size / 2 * np.vstack([np.zeros(3), arc, np.zeros(3)]) @ R.T,))
@@ -101,7 +101,7 @@ class SlideEncoder(Encoder):
     start: Array
 
     def carried_by(self, into: Mapping[str, str], poses: Mapping[str, Array]) -> Self:
-        X, X_c = (relative_pose(link, into, poses) for link in (self.link, str(self.seen_from)))
+        X, X_c = (compute_relative_pose(link, into, poses) for link in (self.link, str(self.seen_from)))
         axis, start = X_c[:3, :3] @ self.axis, transform(X_c, self.start)
         return replace(super().carried_by(into, poses), axis=axis, point=transform(X, self.point), start=start)
 
@@ -120,7 +120,9 @@ class SlideEncoder(Encoder):
     def rate(self, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array) -> Array:
         """Return a · (velocity of the centre on one link − on the other), shape (1, n)."""
         centre = transform(X_link, self.point)
-        slip = point_velocity(V_link, centre - X_link[:3, 3]) - point_velocity(V_reference, centre - X_reference[:3, 3])
+        slip = compute_point_velocity(V_link, centre - X_link[:3, 3]) - compute_point_velocity(
+            V_reference, centre - X_reference[:3, 3]
+        )
         return (X_reference[:3, :3] @ self.axis)[None] @ slip
 
 

@@ -12,9 +12,16 @@ import numpy as np
 
 from ...geometry import components
 from ...geometry.jets import Jet
-from ...geometry.vectors import Array, Numbers, cross, hat, unit
-from ..cameras import ViewGeometry, VirtualJoint, across, apart, normalise_rates, on_plane
-from ..images import SeenLine, line_fed
+from ...geometry.vectors import Array, Numbers, cross, hat, normalise_vector
+from ..cameras import (
+    ViewGeometry,
+    VirtualJoint,
+    find_nearest_on_line,
+    make_line_chain,
+    normalise_rates,
+    require_distance,
+)
+from ..images import SeenLine, expand_line_error
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -47,17 +54,17 @@ class ImageLine(SeenLine):
     def suppose_plane(p: Array, d: Array, r: Array, g: Array) -> tuple[Array, Array]:
         """Return the line in which the plane of C and the line meets that of g."""
         n = normalise_rates(cross(p, d))[0]
-        foot = on_plane(n, g)
+        foot = find_nearest_on_line(n, g)
         return foot, normalise_rates(cross(n, foot))[0]
 
     @staticmethod
     def error_jets(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
-        return line_fed(components.cross(p, d), wanted)
+        return expand_line_error(components.cross(p, d), wanted)
 
     def chain(self, at: ViewGeometry) -> tuple[VirtualJoint, ...]:
-        apart(at, at.foot, 0.0, f"image_line {self.leg!r}", "a line that does not meet it")
-        out = unit(at.foot - at.C)
-        return across(at, np.cross(out, at.d), out, 1)
+        require_distance(at, at.foot, 0.0, f"image_line {self.leg!r}", "a line that does not meet it")
+        out = normalise_vector(at.foot - at.C)
+        return make_line_chain(at, np.cross(out, at.d), out, 1)
 
 
 KIND = ImageLine

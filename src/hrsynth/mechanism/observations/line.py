@@ -12,33 +12,33 @@ import numpy as np
 
 from ...geometry import components
 from ...geometry.jets import Jet
-from ...geometry.screws import couple, force, normals
-from ...geometry.vectors import Array, Numbers, cross, frozen, hat, plane_axes, unit
-from ...tolerances import LINE_AT_CENTRE
+from ...geometry.screws import find_normals, force, make_couple
+from ...geometry.vectors import Array, Numbers, build_plane_axes, cross, freeze_array, hat, normalise_vector
+from ...tolerances import LINE_CENTRE_DISTANCE_TOL
 from ..cameras import (
     CameraObservation,
     FixedValueLocus,
     ViewGeometry,
     VirtualJoint,
-    across,
-    gimbal,
-    kept_in,
+    draw_line_piece,
+    make_angle_locus,
+    make_line_chain,
+    make_plane_locus,
+    make_universal,
     normalise_rates,
-    stretch,
-    turned_across,
 )
-from ..images import tilt_vector
+from ..images import rotate_by_noise
 from ..observation import Drawn
 
 
-def line_chain(at: ViewGeometry) -> tuple[VirtualJoint, ...]:
+def make_line_sensor_chain(at: ViewGeometry) -> tuple[VirtualJoint, ...]:
     """Return U̲R̲P̲-C; if the line meets C, P̲P̲-U̲-C at its point in a fixed plane."""
     away = at.foot - at.C
-    if np.linalg.norm(away) > LINE_AT_CENTRE:
-        return across(at, np.cross(unit(away), at.d), unit(away), 3)
+    if np.linalg.norm(away) > LINE_CENTRE_DISTANCE_TOL:
+        return make_line_chain(at, np.cross(normalise_vector(away), at.d), normalise_vector(away), 3)
     return (
-        *(VirtualJoint("P", at.B, (axis,), True) for axis in plane_axes(at.d)),
-        gimbal(at.B, at.d, None, actuated=True),
+        *(VirtualJoint("P", at.B, (axis,), True) for axis in build_plane_axes(at.d)),
+        make_universal(at.B, at.d, None, actuated=True),
         VirtualJoint("C", at.B, (at.d,)),
     )
 
@@ -57,7 +57,7 @@ class SpaceLine(CameraObservation):
     size = 6
     rank = 4
     images_point = False
-    dimension = frozen([0, 0, 0, 1, 1, 1])
+    dimension = freeze_array([0, 0, 0, 1, 1, 1])
     feature_error = "y − y*: of the direction, of the moment"
     found_by = frozenset({"m", "rad"})
 
@@ -77,40 +77,40 @@ class SpaceLine(CameraObservation):
     def sense(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         """Return its point nearest to C with an error, its direction in a cone."""
         d, h = value[:3], value[3:]
-        turned = tilt_vector(d, shocks[1], noise.get("rad", 0.0))
+        turned = rotate_by_noise(d, shocks[1], noise.get("rad", 0.0))
         return np.concatenate([turned, cross(cross(d, h) + noise.get("m", 0.0) * shocks[0], turned)])
 
     @staticmethod
     def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
         """Return a segment of the line, and the perpendicular to it from C."""
-        return Drawn((stretch(p, d, size), np.array([0 * p, p - (p @ d) * d])))
+        return Drawn((draw_line_piece(p, d, size), np.array([0 * p, p - (p @ d) * d])))
 
     @staticmethod
     def polylines(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
-        return (stretch(p, d, size),)
+        return (draw_line_piece(p, d, size),)
 
     def wrenches(self, at: ViewGeometry) -> list[Numbers]:
-        return line_wrenches(at)
+        return make_line_wrenches(at)
 
     def chain(self, at: ViewGeometry) -> tuple[VirtualJoint, ...]:
-        return line_chain(at)
+        return make_line_sensor_chain(at)
 
     def loci(self, at: ViewGeometry) -> tuple[FixedValueLocus, ...]:
-        return line_loci(at)
+        return make_line_loci(at)
 
     def pointing(self, values: Array) -> Array | None:
         sizes = np.linalg.norm(values[:, 3:], axis=1)
-        return normalise_rates(values[:, 3:])[0] if sizes.min() > LINE_AT_CENTRE else None
+        return normalise_rates(values[:, 3:])[0] if sizes.min() > LINE_CENTRE_DISTANCE_TOL else None
 
 
-def line_loci(at: ViewGeometry) -> tuple[FixedValueLocus, ...]:
+def make_line_loci(at: ViewGeometry) -> tuple[FixedValueLocus, ...]:
     """Return a point on the line, and its direction."""
-    return kept_in(at.B, at.B, *normals(at.d)), turned_across(at.d, *normals(at.d))
+    return make_plane_locus(at.B, at.B, *find_normals(at.d)), make_angle_locus(at.d, *find_normals(at.d))
 
 
-def line_wrenches(at: ViewGeometry) -> list[Numbers]:
+def make_line_wrenches(at: ViewGeometry) -> list[Numbers]:
     """Return two forces and two moments normal to d, at the line."""
-    return [wrench for n in normals(at.d) for wrench in (force(n, at.B), couple(n))]
+    return [wrench for n in find_normals(at.d) for wrench in (force(n, at.B), make_couple(n))]
 
 
 KIND = SpaceLine

@@ -9,20 +9,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from ...geometry.jets import Jet
-from ...geometry.screws import force, normals
+from ...geometry.screws import find_normals, force
 from ...geometry.vectors import Array, Numbers, dot
 from ..cameras import (
     CameraObservation,
     FixedValueLocus,
     ViewGeometry,
     VirtualJoint,
-    apart,
-    depth_plane,
-    gimbal,
-    kept_in,
+    make_depth_plane,
+    make_plane_locus,
+    make_universal,
     normalise_rates,
+    require_distance,
 )
-from ..images import point_image, point_slope, shifted_point, tilt_vector
+from ..images import derive_point_slope, project_point, rotate_by_noise, shift_point
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,7 +50,7 @@ class ImagePoint(CameraObservation):
     @staticmethod
     def plane(p: Array, d: Array, r: Array) -> Array | None:
         """Return z = Z, parallel to the image plane."""
-        return depth_plane(p[..., 2:])
+        return make_depth_plane(p[..., 2:])
 
     @staticmethod
     def suppose_plane(p: Array, d: Array, r: Array, g: Array) -> tuple[Array, Array]:
@@ -59,14 +59,14 @@ class ImagePoint(CameraObservation):
 
     @staticmethod
     def error_jets(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
-        x, y = point_image(wanted).tolist()
+        x, y = project_point(wanted).tolist()
         return [p[0] / p[2] - x, p[1] / p[2] - y]
 
     def error(self, value: Array, wanted: Array) -> Array:
-        return point_image(value) - point_image(wanted)
+        return project_point(value) - project_point(wanted)
 
     def error_slope(self, value: Array, wanted: Array) -> Array:
-        return point_slope(value)
+        return derive_point_slope(value)
 
     def in_front(self, X_reference: Array, X_link: Array) -> float:
         return self.ahead(X_reference, X_link)
@@ -74,22 +74,22 @@ class ImagePoint(CameraObservation):
     def sense(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         """Return the image point with an error, or the ray in a cone."""
         if "px" in noise:
-            return shifted_point(value, shocks[0], self.pixels(noise))
-        return tilt_vector(value, shocks[0], noise["rad"])
+            return shift_point(value, shocks[0], self.pixels(noise))
+        return rotate_by_noise(value, shocks[0], noise["rad"])
 
     def wrenches(self, at: ViewGeometry) -> list[Numbers]:
-        return [force(n, at.B) for n in normals(at.B - at.C)]
+        return [force(n, at.B) for n in find_normals(at.B - at.C)]
 
     def chain(self, at: ViewGeometry) -> tuple[VirtualJoint, ...]:
-        apart(at, at.B, 0.0, f"point {self.leg!r}", "a point outside of it")
+        require_distance(at, at.B, 0.0, f"point {self.leg!r}", "a point outside of it")
         return (
-            gimbal(at.C, at.ray, at.far, actuated=True),
+            make_universal(at.C, at.ray, at.far, actuated=True),
             VirtualJoint("P", at.C, (at.ray,)),
             VirtualJoint("S", at.B),
         )
 
     def loci(self, at: ViewGeometry) -> tuple[FixedValueLocus, ...]:
-        return (kept_in(at.B, at.C, *normals(at.ray)),)
+        return (make_plane_locus(at.B, at.C, *find_normals(at.ray)),)
 
 
 KIND = ImagePoint

@@ -18,11 +18,11 @@ from ..cameras import (
     MetricPoint,
     ViewGeometry,
     VirtualJoint,
-    apart,
-    gimbal,
-    kept_in,
+    draw_line_piece,
+    make_plane_locus,
+    make_universal,
     normalise_rates,
-    stretch,
+    require_distance,
 )
 from ..observation import Drawn
 
@@ -55,21 +55,21 @@ class PointPosition(MetricPoint):
     @staticmethod
     def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
         """Return the ray, and a cross of the camera's axes at its end."""
-        return Drawn((np.array([0 * p, p]), *(stretch(p, e, size / 4) for e in np.eye(3))))
+        return Drawn((np.array([0 * p, p]), *(draw_line_piece(p, e, size / 4) for e in np.eye(3))))
 
     def wrenches(self, at: ViewGeometry) -> list[Numbers]:
         return [force(e, at.B) for e in np.eye(3, dtype=int).astype(at.B.dtype)]
 
     def chain(self, at: ViewGeometry) -> tuple[VirtualJoint, ...]:
-        apart(at, at.B, 0.0, f"position {self.leg!r}", "a point outside of it")
+        require_distance(at, at.B, 0.0, f"position {self.leg!r}", "a point outside of it")
         return (
-            gimbal(at.C, at.ray, at.far, actuated=True),
+            make_universal(at.C, at.ray, at.far, actuated=True),
             VirtualJoint("P", at.C, (at.ray,), actuated=True),
             VirtualJoint("S", at.B),
         )
 
     def loci(self, at: ViewGeometry) -> tuple[FixedValueLocus, ...]:
-        return (kept_in(at.B, at.B, *np.eye(3)),)
+        return (make_plane_locus(at.B, at.B, *np.eye(3)),)
 
     def pointing(self, values: Array) -> Array | None:
         return normalise_rates(values)[0]

@@ -45,7 +45,7 @@ class Ear:
     open: bool = False
 
 
-def boxes_of(mechanism: Mechanism, observed: Collection[str], virtual: Collection[str]) -> list[Box]:
+def list_boxes(mechanism: Mechanism, observed: Collection[str], virtual: Collection[str]) -> list[Box]:
     """Every joint in one box; a parallelogram whose cranks are neither observed nor joined to anything else is one."""
     kept = {mechanism.base, mechanism.platform, *observed}
     pairs = [
@@ -61,7 +61,7 @@ def boxes_of(mechanism: Mechanism, observed: Collection[str], virtual: Collectio
             edge.joints,
             edge.tail,
             edge.head,
-            any(j.actuated for j in joints),
+            any(j.is_actuated for j in joints),
             not set(edge.joints).isdisjoint(virtual),
             edge.inside,
         )
@@ -70,24 +70,24 @@ def boxes_of(mechanism: Mechanism, observed: Collection[str], virtual: Collectio
         if joint.name not in inner:
             letter = "6" if joint.type is JointType.FREE else joint.type.value
             found[joint.name] = Box(
-                letter, (joint.name,), joint.predecessor, joint.successor, joint.actuated, joint.name in virtual
+                letter, (joint.name,), joint.predecessor, joint.successor, joint.is_actuated, joint.name in virtual
             )
     return [found[name] for name in mechanism.joints if name in found]
 
 
-def ears(boxes: Iterable[Box], ends: Sequence[str]) -> Iterator[Ear]:
+def split_ears(boxes: Iterable[Box], ends: Sequence[str]) -> Iterator[Ear]:
     """All boxes, each in one ear; the links ``ends`` are there from the start."""
     left = list(boxes)
     there = dict.fromkeys(ends)
     while left:
-        ear = _ear(left, tuple(there))
+        ear = _find_ear(left, tuple(there))
         there.update(dict.fromkeys(ear.links))
         taken = set(map(id, ear.boxes))
         left = [box for box in left if id(box) not in taken]
         yield ear
 
 
-def _ear(boxes: Sequence[Box], there: tuple[str, ...]) -> Ear:
+def _find_ear(boxes: Sequence[Box], there: tuple[str, ...]) -> Ear:
     """The shortest path between two links that are there; else the longest way out; else what hangs on nothing."""
     at: dict[str, list[Box]] = {}
     for box in boxes:
@@ -97,7 +97,7 @@ def _ear(boxes: Sequence[Box], there: tuple[str, ...]) -> Ear:
     closed: Ear | None = None
     out: Ear | None = None
     for start in there:
-        for ear in _ways(at, start, known):
+        for ear in _list_ways(at, start, known):
             if not ear.open and (closed is None or len(ear.boxes) < len(closed.boxes)):
                 closed = ear
             elif ear.open and (out is None or len(ear.boxes) > len(out.boxes)):
@@ -106,7 +106,7 @@ def _ear(boxes: Sequence[Box], there: tuple[str, ...]) -> Ear:
     return found if found is not None else Ear((boxes[0],), (boxes[0].tail, boxes[0].head), True)
 
 
-def _ways(at: dict[str, list[Box]], start: str, known: set[str]) -> Iterator[Ear]:
+def _list_ways(at: dict[str, list[Box]], start: str, known: set[str]) -> Iterator[Ear]:
     """The shortest ways from a link over links that are new: to each that is there, and to each new one."""
     pending = [Ear((), (start,))]
     seen = {start}

@@ -14,11 +14,11 @@ from itertools import pairwise
 from ...errors import HrsynthError
 from ...mechanism import Mechanism
 from ...mechanism.legs import LegDecomposition, decompose
-from .boxes import Box, Ear, boxes_of, ears
+from .boxes import Box, Ear, list_boxes, split_ears
 
 Point = tuple[float, int]
 """Column and lane."""
-BESIDE = 0.4
+COLUMN_BAR_DISTANCE_MAX = 0.4
 """How far bars of one column stand apart at most (columns)."""
 
 
@@ -94,38 +94,38 @@ def plan(
     ``observed`` are names of links (default: those of the mechanism's observations), ``virtual`` names of joints.
     Raises ``BadRequest`` for a leg that is not there.
     """
-    decomposition = mechanism if isinstance(mechanism, LegDecomposition) else _anatomy(mechanism)
+    decomposition = mechanism if isinstance(mechanism, LegDecomposition) else _decompose_legs(mechanism)
     whole = mechanism.mechanism if isinstance(mechanism, LegDecomposition) else mechanism
-    seen = (o.link for o in whole.observations if o.by_segment) if observed is None else observed
+    seen = (o.link for o in whole.observations if o.is_segment_direction) if observed is None else observed
     links = frozenset(seen)
-    boxes = sorted(boxes_of(whole, links, virtual), key=lambda box: links.isdisjoint((box.tail, box.head)))
-    groups, platform = _groups(whole, decomposition, boxes)
+    boxes = sorted(list_boxes(whole, links, virtual), key=lambda box: links.isdisjoint((box.tail, box.head)))
+    groups, platform = _group_legs(whole, decomposition, boxes)
     if leg is not None:
         chosen = (decomposition or decompose(whole)).leg(leg)
         own = [box for box in boxes if set(box.joints) <= set(chosen.joints)]
         groups, platform = (
-            [_LegBoxes(leg, tuple(ears(own, (whole.base, chosen.platform_link))))],
+            [_LegBoxes(leg, tuple(split_ears(own, (whole.base, chosen.platform_link))))],
             (chosen.platform_link,),
         )
-    columns = _columns(groups, whole.base)
+    columns = _choose_columns(groups, whole.base)
     ends = {group.ears[0].links[-1] for group in groups if group.ears}
     spots, ways, rows = _place_groups(groups, columns)
-    return Layout(whole, tuple(spots), tuple(_nets(whole, ends, ways, columns)), tuple(rows), links, platform)
+    return Layout(whole, tuple(spots), tuple(_list_nets(whole, ends, ways, columns)), tuple(rows), links, platform)
 
 
-def _anatomy(mechanism: Mechanism) -> LegDecomposition | None:
+def _decompose_legs(mechanism: Mechanism) -> LegDecomposition | None:
     try:
         return decompose(mechanism)
     except HrsynthError:
         return None
 
 
-def _groups(
+def _group_legs(
     mechanism: Mechanism, decomposition: LegDecomposition | None, boxes: list[Box]
 ) -> tuple[list[_LegBoxes], tuple[str, ...]]:
     """The legs in the order of what they end on, the platform's own joints after those of the first end."""
     ends = (mechanism.base, mechanism.platform)
-    all_samples = [_LegBoxes(None, tuple(ears(boxes, ends)))]
+    all_samples = [_LegBoxes(None, tuple(split_ears(boxes, ends)))]
     if decomposition is None:
         return all_samples, (mechanism.platform,)
     of_leg = {name: leg.label for leg in decomposition.legs for name in leg.joints}
@@ -140,16 +140,16 @@ def _groups(
     groups: list[_LegBoxes] = []
     for attach in attached:
         groups += [
-            _LegBoxes(leg.label, tuple(ears(members.get(leg.label, ()), (mechanism.base, attach))))
+            _LegBoxes(leg.label, tuple(split_ears(members.get(leg.label, ()), (mechanism.base, attach))))
             for leg in decomposition.legs
             if leg.platform_link == attach
         ]
         if attach == attached[0] and inner:
-            groups.append(_LegBoxes(None, tuple(ears(inner, attached))))
+            groups.append(_LegBoxes(None, tuple(split_ears(inner, attached))))
     return groups, decomposition.platform
 
 
-def _columns(groups: Sequence[_LegBoxes], base: str) -> dict[str, int]:
+def _choose_columns(groups: Sequence[_LegBoxes], base: str) -> dict[str, int]:
     """A column for each link, such that every box has its two links in different ones: longest ways from the left."""
     import networkx as nx
 
@@ -175,28 +175,28 @@ def _place_groups(
     spots: list[PlacedBox] = []
     ways: list[_Way] = []
     rows: list[Row] = []
-    shared = _shared_links(ear for group in groups for ear in group.ears)
+    shared = _list_shared_links(ear for group in groups for ear in group.ears)
     top = 0
     for number, group in enumerate(groups):
         lanes: list[list[tuple[int, int]]] = []
         for ear in group.ears:
             ends = sorted((columns[ear.links[0]], columns[ear.links[-1]]))
-            lane = _free(lanes, ends[0], ends[1])
-            xs = _between(ear, columns, shared)
+            lane = _find_free_lane(lanes, ends[0], ends[1])
+            xs = _place_boxes(ear, columns, shared)
             spots += [PlacedBox(box, x, top + lane, number) for box, x in zip(ear.boxes, xs, strict=True)]
-            ways += _ways(ear, xs, columns, shared, top + lane, number)
+            ways += _draw_ways(ear, xs, columns, shared, top + lane, number)
         touched = [columns[link] for ear in group.ears for link in ear.links] or [0]
         rows.append(Row(group.label, top, top + max(len(lanes), 1) - 1, min(touched), max(touched)))
         top += max(len(lanes), 1)
     return spots, ways, rows
 
 
-def _shared_links(found: Iterable[Ear]) -> set[str]:
+def _list_shared_links(found: Iterable[Ear]) -> set[str]:
     """The links that have a place of their own: ends of ears."""
     return {link for ear in found for link in ((ear.links[0],) if ear.open else (ear.links[0], ear.links[-1]))}
 
 
-def _free(lanes: list[list[tuple[int, int]]], start: int, end: int) -> int:
+def _find_free_lane(lanes: list[list[tuple[int, int]]], start: int, end: int) -> int:
     """The first lane in which nothing stands from one place to another; it is taken."""
     for lane, taken in enumerate(lanes):
         if all(end < a or b < start for a, b in taken):
@@ -206,7 +206,7 @@ def _free(lanes: list[list[tuple[int, int]]], start: int, end: int) -> int:
     return len(lanes) - 1
 
 
-def _between(ear: Ear, columns: dict[str, int], shared: set[str]) -> list[float]:
+def _place_boxes(ear: Ear, columns: dict[str, int], shared: set[str]) -> list[float]:
     """The columns of the boxes, as evenly as half columns allow between links that have a place of their own."""
     fixed = [i for i, link in enumerate(ear.links) if link in shared or i in (0, len(ear.links) - 1)]
     xs: list[float] = []
@@ -217,7 +217,7 @@ def _between(ear: Ear, columns: dict[str, int], shared: set[str]) -> list[float]
     return xs
 
 
-def _ways(ear: Ear, xs: list[float], columns: dict[str, int], shared: set[str], lane: int, row: int) -> list[_Way]:
+def _draw_ways(ear: Ear, xs: list[float], columns: dict[str, int], shared: set[str], lane: int, row: int) -> list[_Way]:
     """The line of each link of an ear: from the box before it, through its own place, to the box after it."""
     found: list[_Way] = []
     for i, link in enumerate(ear.links):
@@ -229,14 +229,18 @@ def _ways(ear: Ear, xs: list[float], columns: dict[str, int], shared: set[str], 
     return found
 
 
-def _nets(mechanism: Mechanism, platform: Collection[str], ways: list[_Way], columns: dict[str, int]) -> Iterable[Net]:
+def _list_nets(
+    mechanism: Mechanism, platform: Collection[str], ways: list[_Way], columns: dict[str, int]
+) -> Iterable[Net]:
     table: dict[str, list[_Way]] = {}
     for way in ways:
         table.setdefault(way[0], []).append(way)
     bars = {
-        link: _reach(own) for link, own in table.items() if len(own) > 1 or link == mechanism.base or link in platform
+        link: _bound_lanes(own)
+        for link, own in table.items()
+        if len(own) > 1 or link == mechanism.base or link in platform
     }
-    places = _apart(bars, columns)
+    places = _place_bars(bars, columns)
     for link in mechanism.links:
         if link in table:
             at = float(columns[link])
@@ -247,20 +251,21 @@ def _nets(mechanism: Mechanism, platform: Collection[str], ways: list[_Way], col
             yield Net(link, moved, (places[link], *bars[link]) if link in bars else None, table[link][0][2])
 
 
-def _reach(ways: list[_Way]) -> tuple[int, int]:
+def _bound_lanes(ways: list[_Way]) -> tuple[int, int]:
     """The first and the last lane of a link."""
     lanes = [points[0][1] for _, points, _ in ways]
     return min(lanes), max(lanes)
 
 
-def _apart(bars: dict[str, tuple[int, int]], columns: dict[str, int]) -> dict[str, float]:
+def _place_bars(bars: dict[str, tuple[int, int]], columns: dict[str, int]) -> dict[str, float]:
     """Place the bars: in their columns, those that share lanes beside each other."""
     places: dict[str, float] = {}
     for column in sorted({columns[link] for link in bars}):
         tracks: list[list[tuple[int, int]]] = []
-        track = {link: _free(tracks, *bars[link]) for link in bars if columns[link] == column}
-        step = BESIDE / max(len(tracks) - 1, 1)
+        track = {link: _find_free_lane(tracks, *bars[link]) for link in bars if columns[link] == column}
+        step = COLUMN_BAR_DISTANCE_MAX / max(len(tracks) - 1, 1)
         places |= {
-            link: column + step * number - (BESIDE / 2 if len(tracks) > 1 else 0.0) for link, number in track.items()
+            link: column + step * number - (COLUMN_BAR_DISTANCE_MAX / 2 if len(tracks) > 1 else 0.0)
+            for link, number in track.items()
         }
     return places

@@ -32,24 +32,24 @@ WORDS = {
 }
 
 
-def symbol(letter: str, x: float, y: float, turned: float, fill: str, said: str, joints: str) -> str:
+def draw_symbol(letter: str, x: float, y: float, turned: float, fill: str, said: str, joints: str) -> str:
     """The symbol at a place, turned by an angle in degrees; ``joints`` are the names that it stands for."""
-    return svg.element(
+    return svg.format_element(
         "g",
-        svg.title(said),
+        svg.format_title(said),
         SHAPES[letter],
         fill=fill,
         data_joint=joints,
-        transform=f"translate({svg.number(x)} {svg.number(y)})"
-        + (f"rotate({svg.number(turned)})" if abs(turned) > 0.05 else ""),
+        transform=f"translate({svg.format_coordinate(x)} {svg.format_coordinate(y)})"
+        + (f"rotate({svg.format_coordinate(turned)})" if abs(turned) > 0.05 else ""),
     )
 
 
-def arrow(start: svg.Place, end: svg.Place) -> str:
+def draw_arrow(start: svg.Place, end: svg.Place) -> str:
     """An arrow head in the middle of a segment (path data)."""
     (x, y), (u, v) = start, end
     length = max(((u - x) ** 2 + (v - y) ** 2) ** 0.5, 1e-9)
     a, b = (u - x) / length, (v - y) / length
     middle = ((x + u) / 2 + 6 * a, (y + v) / 2 + 6 * b)
     wings = [(middle[0] - 13 * a - s * 6 * b, middle[1] - 13 * b + s * 6 * a) for s in (1, -1)]
-    return svg.lines([(middle, *wings)]) + "Z"
+    return svg.format_lines([(middle, *wings)]) + "Z"

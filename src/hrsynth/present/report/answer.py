@@ -7,26 +7,33 @@ from collections.abc import Iterator
 from ...analysis.controllability import Legs
 from ...analysis.derive import Derivation
 from ...analysis.verdict import Verdict
-from ..text.robots import exact_cell, unseen
-from ..text.sentences import alike, describe_seen, fewest, things, usual_error, where_lost
-from .parts import Parts, Refused
+from ..text.robots import format_exact_cell, format_unobserved_cell
+from ..text.sentences import (
+    describe_locus,
+    describe_map_error,
+    describe_seen,
+    describe_similar_poses,
+    describe_smallest_sets,
+    name_set_members,
+)
+from .parts import Parts, RefusedPart
 
 
 def answer(found: Derivation, told: Parts) -> Iterator[str]:
     """Yield a sentence for each part of the report that has a result."""
     yield describe_seen(found.verdict, found.setup.labels, found.setup)
-    if not isinstance(told.legs, Refused):
+    if not isinstance(told.legs, RefusedPart):
         best = max(each.rank for each in told.legs.sets)
-        yield fewest(told.legs.minimal, things(found.setup), best, found.dof)
-    if not isinstance(told.singularity, Refused):
-        yield where_lost(told.singularity.words)
-    if not isinstance(told.modes, Refused) and (poses := alike(told.modes)) is not None:
+        yield describe_smallest_sets(told.legs.minimal, name_set_members(found.setup), best, found.dof)
+    if not isinstance(told.singularity, RefusedPart):
+        yield describe_locus(told.singularity.words)
+    if not isinstance(told.modes, RefusedPart) and (poses := describe_similar_poses(told.modes)) is not None:
         yield poses
-    if not isinstance(told.accuracy, Refused):
-        yield from usual_error(told.accuracy)
+    if not isinstance(told.accuracy, RefusedPart):
+        yield from describe_map_error(told.accuracy)
 
 
-def good(found: Verdict) -> bool:
+def is_fully_observed(found: Verdict) -> bool:
     """Return True if all dof are observed; of a formation all but its trivial motions."""
     return not found.unobserved and (found.rank == found.dof if found.formation is None else not found.formation.flexes)
 
@@ -36,9 +43,9 @@ def set_rows(found: Legs, most: int) -> Iterator[tuple[tuple[str, ...], Verdict,
     verdict, whether they are smallest."""
     alike: dict[object, tuple[list[str], Verdict, str, bool]] = {}
     for each, exact in zip(found.sets[:most], found.exact, strict=False):
-        cell, smallest = exact_cell(exact, each.rank), each.legs in found.minimal
+        cell, smallest = format_exact_cell(exact, each.rank), each.legs in found.minimal
         shown = (len(each.legs), each.verdict, each.rank, each.rank_at_zero, cell, smallest)
-        key = each.legs if unseen(each) else shown
+        key = each.legs if format_unobserved_cell(each) else shown
         alike.setdefault(key, ([], each, cell, smallest))[0].append(", ".join(each.legs))
     for sets, each, cell, smallest in alike.values():
         yield tuple(sets), each, cell, smallest

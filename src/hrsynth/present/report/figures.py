@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 
 from ...analysis.derive import Derivation
 from ...mechanism.legs import LegDecomposition
-from ...rewrite.rules import rules
+from ...rewrite.rules import list_rules
 from ...rewrite.strategy import Step
-from ..drawings.schematic import leg_svg, robot_svg
+from ..drawings.schematic import draw_leg_svg, draw_robot_svg
 
-SOURCES = {rule.name: rule.source for rule in rules()}
+SOURCES = {rule.name: rule.source for rule in list_rules()}
 _NAMES = re.compile(
     r"<title>.*?</title>|<desc>.*?</desc>|<text[^>]*>leg [^<]*</text>"
     r'| (?:data-joint|data-link|aria-label)="[^"]*"',
@@ -35,13 +35,13 @@ class LegPair:
     hidden_drawing: str | None
 
 
-def actuators(found: Derivation) -> set[str]:
+def list_virtual_actuators(found: Derivation) -> set[str]:
     """Return the virtual actuators of the hidden robot."""
     joints = found.hidden.joints.values() if found.hidden is not None else ()
-    return {joint.name for joint in joints if joint.actuated}
+    return {joint.name for joint in joints if joint.is_actuated}
 
 
-def pairs(found: Derivation) -> list[LegPair]:
+def list_leg_figures(found: Derivation) -> list[LegPair]:
     """Return the legs in order, each kind once."""
     real, seen = found.setup.decomposition, {o.link for o in found.setup.observed}
     states = [step.state for step in found.steps if step.state is not None]
@@ -56,15 +56,19 @@ def pairs(found: Derivation) -> list[LegPair]:
             continue
         drawing = None
         if hidden is not None and other is not None:
-            drawing = leg_svg(
-                hidden, leg.label, observed=seen, virtual=actuators(found), title=f"Leg {leg.label} of the hidden robot"
+            drawing = draw_leg_svg(
+                hidden,
+                leg.label,
+                observed=seen,
+                virtual=list_virtual_actuators(found),
+                title=f"Leg {leg.label} of the hidden robot",
             )
         kinds[key] = LegPair(
             (leg.label,),
             key[2],
             key[0],
             word,
-            leg_svg(real, leg.label, observed=seen, title=f"Leg {leg.label} of the real robot"),
+            draw_leg_svg(real, leg.label, observed=seen, title=f"Leg {leg.label} of the real robot"),
             drawing,
         )
     return list(kinds.values())
@@ -84,7 +88,7 @@ class StepFigure:
     before: str
     after: str
 
-    def alike(self, other: StepFigure) -> bool:
+    def is_like(self, other: StepFigure) -> bool:
         """Return True if two steps of different legs look the same but for names."""
         drawings = ((self.before, other.before), (self.after, other.after))
         return (
@@ -122,10 +126,10 @@ def step_figures(found: Derivation) -> list[StepFigure]:
             (step.leg,) if step.leg else (),
             (step.reason,),
             step.largest_angle,
-            _picture(step, "before", decomposition, leg, seen, virtual),
-            _picture(step, "after", after, leg, seen, then),
+            _draw_step(step, "before", decomposition, leg, seen, virtual),
+            _draw_step(step, "after", after, leg, seen, then),
         )
-        alike = next((i for i, other in enumerate(drawn) if one.alike(other)), None)
+        alike = next((i for i, other in enumerate(drawn) if one.is_like(other)), None)
         if alike is None:
             drawn.append(one)
         else:
@@ -134,7 +138,7 @@ def step_figures(found: Derivation) -> list[StepFigure]:
     return drawn
 
 
-def _picture(
+def _draw_step(
     step: Step,
     word: str,
     decomposition: LegDecomposition,
@@ -144,5 +148,5 @@ def _picture(
 ) -> str:
     title = f"{step.rule}: {word}" + (f" (leg {leg})" if leg else "")
     if leg is None:
-        return robot_svg(decomposition, observed=seen, virtual=virtual, title=title)
-    return leg_svg(decomposition, leg, observed=seen, virtual=virtual, title=title)
+        return draw_robot_svg(decomposition, observed=seen, virtual=virtual, title=title)
+    return draw_leg_svg(decomposition, leg, observed=seen, virtual=virtual, title=title)

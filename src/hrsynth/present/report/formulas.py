@@ -19,7 +19,7 @@ _FORMULA = ("I", "T", "x", "e")
 
 
 @cache
-def _printer() -> Any:
+def _make_printer() -> Any:
     """SymPy's printer of presentation MathML, taught the products of vectors."""
     from sympy.printing.mathml import MathMLPresentationPrinter
     from sympy.printing.precedence import PRECEDENCE
@@ -58,9 +58,9 @@ def _printer() -> Any:
     return Printer()
 
 
-def formula(expression: Any, said: str, zero: bool = True) -> str:
+def format_formula(expression: Any, said: str, zero: bool = True) -> str:
     """Format an expression (SymPy) as MathML; ``said`` is read where MathML is not supported."""
-    found = _printer().doprint(expression).replace("&InvisibleTimes;", "\u2062")
+    found = _make_printer().doprint(expression).replace("&InvisibleTimes;", "\u2062")
     equals = "<mo>=</mo><mn>0</mn>" if zero else ""
     label = escape(said, {'"': "&quot;"})
     return (
@@ -81,7 +81,7 @@ def collect_symbols(where: Mapping[str, str]) -> list[tuple[str, str]]:
     for symbol, meaning in where.items():
         match = _NUMBERED.fullmatch(symbol)
         head, number = (match[1], match[2]) if match else (symbol, "")
-        pattern = _indices(meaning, number, set(where)) if number else meaning
+        pattern = _insert_indices(meaning, number, set(where)) if number else meaning
         kinds.setdefault((head, pattern), []).append(number)
     return [
         (f"{head}i", f"{pattern} (i = {', '.join(numbers)})")
@@ -91,7 +91,7 @@ def collect_symbols(where: Mapping[str, str]) -> list[tuple[str, str]]:
     ]
 
 
-def _indices(meaning: str, number: str, symbols: Collection[str]) -> str:
+def _insert_indices(meaning: str, number: str, symbols: Collection[str]) -> str:
     """Replace the number in a meaning by the index: a letter if it stands alone or in a formula, else a subscript."""
     formula = set(re.findall(r"[^\W\d_]\w*", meaning)) <= {*symbols, *_FORMULA}
     return re.sub(

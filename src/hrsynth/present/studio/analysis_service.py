@@ -32,19 +32,19 @@ class AnalysisService(Value):
         if not isinstance(asked, dict):
             raise BadRequest("request", asked, "an object with a field `ask`")
         name = asked.get("ask")
-        if not isinstance(name, str) or name not in names():
-            raise BadRequest("ask: no such analysis", name, names())
-        return answerer(name)(Request(asked, self.folder, self.uploads, self.given))
+        if not isinstance(name, str) or name not in list_request_names():
+            raise BadRequest("ask: no such analysis", name, list_request_names())
+        return load_answerer(name)(Request(asked, self.folder, self.uploads, self.given))
 
 
 @cache
-def names() -> tuple[str, ...]:
+def list_request_names() -> tuple[str, ...]:
     """List the analyses: the modules of ``asks``."""
     return tuple(sorted(module.name for module in pkgutil.iter_modules(asks.__path__)))
 
 
 @cache
-def answerer(name: str) -> Answerer:
+def load_answerer(name: str) -> Answerer:
     """Return the function of an analysis."""
     found: Answerer = import_module(f"{asks.__name__}.{name}").answer
     return found

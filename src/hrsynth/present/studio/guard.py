@@ -49,8 +49,8 @@ class Guard:
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
         """Answer a request, or open a socket."""
-        host = only(scope, b"host")
-        if host not in self.hosts or not self._own(scope, host):
+        host = get_single_header(scope, b"host")
+        if host not in self.hosts or not self._is_own_request(scope, host):
             await refuse(scope, send, HTTPStatus.FORBIDDEN)
             return
         first, slash, rest = scope["raw_path"].decode("ascii").removeprefix("/").partition("/")
@@ -66,30 +66,30 @@ class Guard:
 
             async def sent(message: Any) -> None:
                 if message["type"] == "http.response.start":
-                    message["headers"] = [*message["headers"], *raw(headers)]
+                    message["headers"] = [*message["headers"], *encode_headers(headers)]
                 await send(message)
 
             await self.app({**scope, "path": f"/{rest}", "raw_path": f"/{rest}".encode()}, receive, sent)
 
-    def _own(self, scope: Any, host: bytes) -> bool:
+    def _is_own_request(self, scope: Any, host: bytes) -> bool:
         """Return True if a request comes from the page, or opens it."""
         if scope["type"] == "http" and scope["method"] in ("GET", "HEAD"):
-            return not values(scope, b"origin") or only(scope, b"origin") == b"http://" + host
-        return only(scope, b"origin") == b"http://" + host
+            return not list_header_values(scope, b"origin") or get_single_header(scope, b"origin") == b"http://" + host
+        return get_single_header(scope, b"origin") == b"http://" + host
 
 
-def values(scope: Any, name: bytes) -> list[bytes]:
+def list_header_values(scope: Any, name: bytes) -> list[bytes]:
     """Return the values of all occurrences of a header."""
     return [value.strip() for key, value in scope["headers"] if key.lower() == name]
 
 
-def only(scope: Any, name: bytes) -> bytes:
+def get_single_header(scope: Any, name: bytes) -> bytes:
     """Return the value of a header that occurs once, else nothing."""
-    found = values(scope, name)
+    found = list_header_values(scope, name)
     return found[0] if len(found) == 1 else b""
 
 
-def raw(headers: dict[str, str]) -> list[tuple[bytes, bytes]]:
+def encode_headers(headers: dict[str, str]) -> list[tuple[bytes, bytes]]:
     """Headers as they are sent."""
     return [(name.encode(), value.encode()) for name, value in headers.items()]
 
@@ -98,5 +98,5 @@ async def refuse(scope: Any, send: Any, status: HTTPStatus, headers: dict[str, s
     """Answer with a status alone."""
     kind = "http" if scope["type"] == "http" else "websocket.http"
     told = {"content-length": "0", "connection": "close", **(headers or {})}
-    await send({"type": f"{kind}.response.start", "status": int(status), "headers": raw(told)})
+    await send({"type": f"{kind}.response.start", "status": int(status), "headers": encode_headers(told)})
     await send({"type": f"{kind}.response.body", "body": b""})

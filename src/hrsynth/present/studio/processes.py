@@ -15,14 +15,14 @@ from dataclasses import dataclass, field
 from threading import Lock
 from typing import Any
 
-from ...budgets import LARGEST_ANSWER, MOST_WAITING, WORKER_START_SECONDS
+from ...budgets import LARGEST_ANSWER, STUDIO_WAITING_REQUESTS_MAX, WORKER_START_TIMEOUT_S
 
 DESK = "hrsynth.present.studio.analysis_service:AnalysisService"
 """Class that answers."""
 START = (
     "import sys, json; sys.path[:] = json.loads(sys.argv[1]); from {} import main; main(int(sys.argv[2]), sys.argv[3])"
 )
-HEAD = 4
+FRAME_LENGTH_BYTES = 4
 """Bytes of a frame's length."""
 
 
@@ -103,7 +103,7 @@ class WorkerProcess:
 
     def ask(self, number: int, text: bytes) -> bool:
         """Append a request to the queue; return False if it is full."""
-        if len(self.waiting) >= MOST_WAITING:
+        if len(self.waiting) >= STUDIO_WAITING_REQUESTS_MAX:
             return False
         self.waiting.append((number, text))
         self.more.set()
@@ -144,16 +144,18 @@ class WorkerProcess:
         whole = False
         try:
             reader, writer = await self._started()
-            writer.write(frame_message(text))
+            writer.write(wrap_message(text))
             async with asyncio.timeout(self.seconds):
                 await writer.drain()
                 answer = await _frame(reader)
             whole = True
             return answer.decode()
         except TimeoutError:
-            return gone(number, f"the analysis took longer than {self.seconds:g} seconds and was cancelled", "TooSlow")
+            return format_gone(
+                number, f"the analysis took longer than {self.seconds:g} seconds and was cancelled", "TooSlow"
+            )
         except (OSError, EOFError):
-            return gone(number, "the analysis process has ended: it may have run out of memory", "Ended")
+            return format_gone(number, "the analysis process has ended: it may have run out of memory", "Ended")
         finally:
             if not whole:
                 self._end()
@@ -165,9 +167,9 @@ class WorkerProcess:
         if self.streams is None:
             channel = await asyncio.to_thread(self.forks.channel)
             self.streams = reader, writer = await asyncio.open_unix_connection(sock=channel)
-            writer.write(frame_message(self.setup))
+            writer.write(wrap_message(self.setup))
             try:
-                async with asyncio.timeout(WORKER_START_SECONDS):
+                async with asyncio.timeout(WORKER_START_TIMEOUT_S):
                     await _frame(reader)
             except BaseException:
                 self._end()
@@ -180,13 +182,13 @@ class WorkerProcess:
             self.streams = None
 
 
-def frame_message(text: bytes) -> bytes:
+def wrap_message(text: bytes) -> bytes:
     """Return a frame, as the other side reads it."""
-    return len(text).to_bytes(HEAD, "big") + text
+    return len(text).to_bytes(FRAME_LENGTH_BYTES, "big") + text
 
 
 async def _frame(reader: asyncio.StreamReader) -> bytes:
-    size = int.from_bytes(await reader.readexactly(HEAD), "big")
+    size = int.from_bytes(await reader.readexactly(FRAME_LENGTH_BYTES), "big")
     if size > 2 * LARGEST_ANSWER:
         raise EOFError(size)
     return await reader.readexactly(size)
@@ -194,10 +196,10 @@ async def _frame(reader: asyncio.StreamReader) -> bytes:
 
 def cancel_message(number: int) -> str:
     """Return the message of a cancelled request."""
-    return gone(number, "cancelled", "Cancelled")
+    return format_gone(number, "cancelled", "Cancelled")
 
 
-def gone(number: int | None, error: str, kind: str) -> str:
+def format_gone(number: int | None, error: str, kind: str) -> str:
     """Return the message of a request without an answer."""
     message: dict[str, Any] = {"n": number, "error": error, "kind": kind}
     return json.dumps(message)

@@ -14,17 +14,17 @@ import numpy as np
 from ...analysis.derive import Derivation, derive
 from ...analysis.observed import ObservedRobot
 from ...analysis.pose_requests import observe
-from ...budgets import FARTHEST_POSE, LARGEST_STUDIO_LIST, LONGEST_STUDIO_NAME, REMEMBERED
+from ...budgets import CACHED_OBSERVED_ROBOTS_COUNT, POSE_VALUE_MAX, STUDIO_LIST_NAMES_MAX, STUDIO_NAME_CHARACTERS_MAX
 from ...description import list_robots, load
 from ...description.example_data import PREFIX
-from ...errors import BadRequest, LoopsNotClosed
+from ...errors import BadRequest, LoopClosureFailure
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.pinocchio_model import PinocchioModel
 from ...mechanism import Mechanism
 from ...results import Value
-from ...tolerances import FOLLOWED
-from ..view.states import Mover, Posed
+from ...tolerances import HIDDEN_ROBOT_RESIDUAL_TOL
+from ..view.states import Mover, RealAndHiddenState
 
 SHIPPED, FILE, FOLDER, GIVEN = "shipped", "file", "folder", "given"
 LISTS, TEXTS = ("motors", "close", "freeze"), ("base", "platform", "keyframe", "unit")
@@ -45,7 +45,7 @@ class RobotSource:
         return _load(self)
 
 
-@lru_cache(maxsize=REMEMBERED)
+@lru_cache(maxsize=CACHED_OBSERVED_ROBOTS_COUNT)
 def _load(source: RobotSource) -> Mechanism:
     return load(source.robot, **dict(source.options))
 
@@ -62,7 +62,7 @@ class Request(Value):
 
     # Fields of any request
 
-    def flag(self, name: str) -> bool:
+    def has_flag(self, name: str) -> bool:
         """Return a truth value, False by default."""
         found = self.fields.get(name)
         if found is not None and not isinstance(found, bool):
@@ -72,12 +72,12 @@ class Request(Value):
     def text(self, name: str, allowed: Iterable[str] | None = None) -> str | None:
         """A short text, one of those ``allowed``."""
         found = self.fields.get(name)
-        return None if found is None else _text(name, found, allowed)
+        return None if found is None else _require_text(name, found, allowed)
 
     def number(self, name: str, low: float, high: float) -> float | None:
         """A number from ``low`` to ``high``."""
         found = self.fields.get(name)
-        return None if found is None else _number(name, found, low, high)
+        return None if found is None else _require_number(name, found, low, high)
 
     def count(self, name: str, low: int, high: int) -> int | None:
         """A whole number from ``low`` to ``high``."""
@@ -89,7 +89,7 @@ class Request(Value):
     def vector(self, name: str, size: int) -> Array | None:
         """So many finite numbers."""
         found = self.fields.get(name)
-        return None if found is None else _vector(name, found, size)
+        return None if found is None else _require_vector(name, found, size)
 
     # The robot
 
@@ -99,8 +99,8 @@ class Request(Value):
         said = self.fields.get("robot")
         if not isinstance(said, dict):
             raise BadRequest("robot", said, "an object with a field `source`")
-        kind, _, name = _text("source of a robot", said.get("source", "")).partition(":")
-        options = _options(said.get("options"))
+        kind, _, name = _require_text("source of a robot", said.get("source", "")).partition(":")
+        options = _list_options(said.get("options"))
         if kind == SHIPPED:
             if name not in list_robots():
                 raise BadRequest("no such shipped robot", name, "a name of the gallery")
@@ -110,13 +110,13 @@ class Request(Value):
                 raise BadRequest(
                     "source given: the command line names no robot", remedy="Choose a robot of the gallery."
                 )
-            own = {**dict(_options(self.given.get("options"))), **dict(options)}
-            return _of_file(str(self.given["robot"]), tuple(sorted(own.items())))
+            own = {**dict(_list_options(self.given.get("options"))), **dict(options)}
+            return _find_source(str(self.given["robot"]), tuple(sorted(own.items())))
         if kind == PREFIX.removesuffix(":"):
             return RobotSource(f"{PREFIX}{name}", options)
         if self.fence is None:
             raise BadRequest("source of a robot", said.get("source"), "shipped:NAME, file:NAME, folder:NAME or given")
-        return _of_file(str(inside(self.fence, name)), options)
+        return _find_source(str(locate_inside(self.fence, name)), options)
 
     @cached_property
     def fence(self) -> Path | None:
@@ -135,7 +135,7 @@ class Request(Value):
     def watched(self) -> tuple[str, ...] | None:
         """Return the names of the observed legs; None: those of the file."""
         found = self.fields.get("watch")
-        return None if found is None else _texts("watch", found)
+        return None if found is None else _require_texts("watch", found)
 
     @cached_property
     def camera(self) -> str | None:
@@ -148,13 +148,13 @@ class Request(Value):
         return observe(self.mechanism, self.watched or None, self.camera).by_segments("the studio")
 
     @property
-    def blind(self) -> bool:
+    def has_no_observation(self) -> bool:
         """Return True if no leg is observed."""
         return self.watched == ()
 
     def seeing(self) -> ObservedRobot:
         """Return the observed robot; raise ``BadRequest`` if no leg is observed."""
-        if self.blind:
+        if self.has_no_observation:
             raise BadRequest("no leg is observed", remedy="Observe at least one leg.")
         return self.setup
 
@@ -165,17 +165,17 @@ class Request(Value):
 
     def mover(self, hidden: bool = False) -> Mover:
         """Return the mover of the robot, and with ``hidden`` of its hidden robot."""
-        other = self.derivation.hidden if hidden and not self.blind else None
-        return _mover(self.setup, other)
+        other = self.derivation.hidden if hidden and not self.has_no_observation else None
+        return _make_mover(self.setup, other)
 
     @property
-    def ends(self) -> tuple[tuple[Posed, Posed], ...]:
+    def ends(self) -> tuple[tuple[RealAndHiddenState, RealAndHiddenState], ...]:
         """Return the ends of each slider; they do not depend on the observed legs."""
-        return _mover(observe(self.mechanism, None, self.camera), None).ends
+        return _make_mover(observe(self.mechanism, None, self.camera), None).ends
 
     # Where it is
 
-    def here(self, mover: Mover, field: str = "here") -> Posed:
+    def here(self, mover: Mover, field: str = "here") -> RealAndHiddenState:
         """Return a configuration, by default the zero configuration; a hidden robot of other legs is ignored. Raise
         ``BadRequest`` if loops are not closed."""
         found = self.fields.get(field)
@@ -184,38 +184,40 @@ class Request(Value):
         if not isinstance(found, dict):
             raise BadRequest(field, found, "the field of an answer, or null")
         model = mover.home.real.model
-        q = _configuration(model, found.get("q"))
+        q = _require_configuration(model, found.get("q"))
         try:
             at = ClosedConfiguration.of(model, q)
-        except LoopsNotClosed as error:
+        except LoopClosureFailure as error:
             raise BadRequest(
                 f"{field}: the loops are not closed: residual", f"{error.residual:.2g}", f"at most {error.tolerance:g}"
             ) from None
         other = found.get("hidden")
         if mover.hidden is None:
-            return Posed(at)
+            return RealAndHiddenState(at)
         if isinstance(other, dict) and other.get("legs") == list(self.setup.labels):
-            q = _configuration(mover.hidden, other.get("q"))
+            q = _require_configuration(mover.hidden, other.get("q"))
             posed = mover.beside(at, q)
             if posed is None:
-                raise BadRequest(f"{field}: hidden robot and platform differ by more than {FOLLOWED:g}")
+                raise BadRequest(
+                    f"{field}: hidden robot and platform differ by more than {HIDDEN_ROBOT_RESIDUAL_TOL:g}"
+                )
             return posed
         if other is not None and not isinstance(other, dict):
             raise BadRequest(f"{field}: hidden", other, "the field of an answer, or null")
         return mover.with_hidden(at)
 
-    def describe_here(self, posed: Posed) -> dict[str, Any]:
+    def describe_here(self, posed: RealAndHiddenState) -> dict[str, Any]:
         """Return the field ``here`` of an answer."""
         hidden = None if posed.hidden is None else {"legs": list(self.setup.labels), "q": posed.hidden.tolist()}
         return {"q": posed.real.q.tolist(), "hidden": hidden}
 
 
-@lru_cache(maxsize=REMEMBERED)
-def _mover(setup: ObservedRobot, hidden: Mechanism | None) -> Mover:
+@lru_cache(maxsize=CACHED_OBSERVED_ROBOTS_COUNT)
+def _make_mover(setup: ObservedRobot, hidden: Mechanism | None) -> Mover:
     return Mover.of(setup, hidden)
 
 
-def inside(root: Path, name: str) -> Path:
+def locate_inside(root: Path, name: str) -> Path:
     """The file of a name in a folder, links resolved; raises ``BadRequest`` for one that lies outside of it or is not
     there."""
     try:
@@ -227,7 +229,7 @@ def inside(root: Path, name: str) -> Path:
     raise BadRequest("no such file", name, "an uploaded file, or one of the folder")
 
 
-def _of_file(robot: str, options: tuple[tuple[str, Any], ...]) -> RobotSource:
+def _find_source(robot: str, options: tuple[tuple[str, Any], ...]) -> RobotSource:
     """A robot by its path, or by a name."""
     try:
         state = Path(robot).stat()
@@ -236,7 +238,7 @@ def _of_file(robot: str, options: tuple[tuple[str, Any], ...]) -> RobotSource:
     return RobotSource(robot, options, (state.st_mtime_ns, state.st_size))
 
 
-def _options(found: Any) -> tuple[tuple[str, Any], ...]:
+def _list_options(found: Any) -> tuple[tuple[str, Any], ...]:
     """The options that are set, sorted by name."""
     if found is None:
         return ()
@@ -249,11 +251,11 @@ def _options(found: Any) -> tuple[tuple[str, Any], ...]:
         if value is None or value == [] or value is False:
             continue
         if name in LISTS:
-            set_[name] = _texts(name, value)
+            set_[name] = _require_texts(name, value)
         elif name in TEXTS:
-            set_[name] = _text(name, value)
+            set_[name] = _require_text(name, value)
         elif name == "tolerance":
-            set_[name] = _number(name, value, 0.0, 1.0)
+            set_[name] = _require_number(name, value, 0.0, 1.0)
         elif value is not True:
             raise BadRequest(name, value, "true or false")
         else:
@@ -264,21 +266,21 @@ def _options(found: Any) -> tuple[tuple[str, Any], ...]:
     return tuple(sorted(set_.items()))
 
 
-def _text(name: str, found: Any, allowed: Iterable[str] | None = None) -> str:
-    if not isinstance(found, str) or len(found) > LONGEST_STUDIO_NAME or "\0" in found:
-        raise BadRequest(name, found, f"a text of at most {LONGEST_STUDIO_NAME} characters")
+def _require_text(name: str, found: Any, allowed: Iterable[str] | None = None) -> str:
+    if not isinstance(found, str) or len(found) > STUDIO_NAME_CHARACTERS_MAX or "\0" in found:
+        raise BadRequest(name, found, f"a text of at most {STUDIO_NAME_CHARACTERS_MAX} characters")
     if allowed is not None and found not in tuple(allowed):
         raise BadRequest(name, found, tuple(allowed))
     return found
 
 
-def _texts(name: str, found: Any) -> tuple[str, ...]:
-    if not isinstance(found, list) or len(found) > LARGEST_STUDIO_LIST:
-        raise BadRequest(name, found, f"a list of at most {LARGEST_STUDIO_LIST} names")
-    return tuple(_text(name, each) for each in found)
+def _require_texts(name: str, found: Any) -> tuple[str, ...]:
+    if not isinstance(found, list) or len(found) > STUDIO_LIST_NAMES_MAX:
+        raise BadRequest(name, found, f"a list of at most {STUDIO_LIST_NAMES_MAX} names")
+    return tuple(_require_text(name, each) for each in found)
 
 
-def _number(name: str, found: Any, low: float, high: float) -> float:
+def _require_number(name: str, found: Any, low: float, high: float) -> float:
     if isinstance(found, bool) or not isinstance(found, int | float):
         raise BadRequest(name, found, "a number")
     if not (math.isfinite(found) if isinstance(found, float) else True) or not low <= found <= high:
@@ -286,15 +288,15 @@ def _number(name: str, found: Any, low: float, high: float) -> float:
     return float(found)
 
 
-def _vector(name: str, found: Any, size: int) -> Array:
+def _require_vector(name: str, found: Any, size: int) -> Array:
     if not isinstance(found, list) or len(found) != size:
         raise BadRequest(name, found, f"a list of {size} numbers")
-    return np.array([_number(name, each, -FARTHEST_POSE, FARTHEST_POSE) for each in found])
+    return np.array([_require_number(name, each, -POSE_VALUE_MAX, POSE_VALUE_MAX) for each in found])
 
 
-def _configuration(model: PinocchioModel, found: Any) -> Array:
+def _require_configuration(model: PinocchioModel, found: Any) -> Array:
     """Read a configuration of a model: of its size, finite, with unit quaternions."""
-    q = _vector("here: coordinates", found, len(model.q0))
+    q = _require_vector("here: coordinates", found, len(model.q0))
     if not model.is_normalized(q):
         raise BadRequest("here: a rotation is not a unit quaternion")
     return q

@@ -17,20 +17,20 @@ LINKS = {
 THREE = "three.min.js"
 
 
-def static(found: View) -> bytes:
+def render_static_page(found: View) -> bytes:
     """Return the view as a page that needs no server."""
-    return page(found).encode()
+    return render_saved_page(found).encode()
 
 
-def inline(found: View) -> str:
+def format_inline(found: View) -> str:
     """Return the page in a frame, for a notebook."""
     return (
-        f'<iframe srcdoc="{escape(page(found))}" title="{escape(name_steering(found.headline()))}" '
+        f'<iframe srcdoc="{escape(render_saved_page(found))}" title="{escape(name_steering(found.headline()))}" '
         'style="width: 100%; height: 560px; border: 0"></iframe>'
     )
 
 
-def page(found: View) -> str:
+def render_saved_page(found: View) -> str:
     """Return the page with all its files."""
     from jinja2.utils import htmlsafe_json_dumps
 

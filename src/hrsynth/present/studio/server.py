@@ -17,14 +17,14 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...budgets import FAREWELL_SECONDS, LARGEST_ASK, MOST_CONNECTIONS, SENDER_SECONDS
+from ...budgets import LARGEST_ASK, SENDER_TIMEOUT_S, SERVER_CLOSE_TIMEOUT_S, STUDIO_CONNECTIONS_MAX
 from ...errors import BadRequest, FileTooLarge, HrsynthError, MissingExtra
 from ...processes import require_posix
 from ...results import with_spelling
 from .. import palette
 from .guard import HOST, Guard
 from .processes import DESK, ForkServer
-from .tabs import Opening, Tabs
+from .tabs import StartupState, Tabs
 
 if TYPE_CHECKING:
     from starlette.requests import Request
@@ -43,7 +43,7 @@ TYPES = {
 }
 """Files of the page's folder that are served."""
 MAIN = "studio.html"
-WRITTEN = {"palette.css": palette.css, "palette.js": palette.js}
+WRITTEN = {"palette.css": palette.format_css, "palette.js": palette.format_js}
 """Generated files of the page."""
 
 
@@ -90,35 +90,35 @@ def studio(
     >>> server = hrsynth.studio("3rrr_m1", open_=False)
     >>> server.stop()
     """
-    from ...description import file_of
-    from ...description.overrides import names
-    from ...description.reading import robot_file
+    from ...description import find_robot_file
+    from ...description.overrides import parse_names
+    from ...description.reading import open_robot_file
     from ...mechanism import Mechanism
 
-    watched = names(observe if observe is None or isinstance(observe, str) else map(str, observe))
+    watched = parse_names(observe if observe is None or isinstance(observe, str) else map(str, observe))
     first = {"camera": camera, "watch": None if watched in (None, ("all",)) else list(watched)}
     if robot is None:
-        here = Opening()
+        here = StartupState()
     elif isinstance(robot, Mechanism):
-        given = _as_read(robot)
-        here = Opening(given=given, mechanism=robot if given is None else None, first=first)
+        given = _describe_source(robot)
+        here = StartupState(given=given, mechanism=robot if given is None else None, first=first)
     elif os.path.isdir(robot):
-        here = Opening(folder=Path(robot))
+        here = StartupState(folder=Path(robot))
     else:
-        robot_file(file_of(robot))
-        here = Opening(given={"robot": str(robot), "options": {}}, first=first)
+        open_robot_file(find_robot_file(robot))
+        here = StartupState(given={"robot": str(robot), "options": {}}, first=first)
     server = StudioServer(here, port)
     if open_:
         server.show()
     return server
 
 
-def view_server(found: View, port: int = 0, open_: bool = True, source: dict[str, Any] | None = None) -> StudioServer:
+def serve_view(found: View, port: int = 0, open_: bool = True, source: dict[str, Any] | None = None) -> StudioServer:
     """Serve the page of a view, without panels; ``source``: the robot and its options on the command line. Raises as
     :func:`studio`."""
-    from ...description.overrides import names
+    from ...description.overrides import parse_names
 
-    if not all(seen.by_segment for seen in found.setup.observed):
+    if not all(seen.is_segment_direction for seen in found.setup.observed):
         raise BadRequest(
             "--sensor: a served view shows directions of segments only",
             ", ".join(found.setup.labels),
@@ -126,9 +126,9 @@ def view_server(found: View, port: int = 0, open_: bool = True, source: dict[str
         )
     robot = found.setup.robot
     if source is None or "/" in (source["keyframe"] or ""):  # the page names no files
-        given = _as_read(robot)
+        given = _describe_source(robot)
     else:
-        lists = {"motors": names(source["motors"]), "freeze": names(source["freeze"] or None)}
+        lists = {"motors": parse_names(source["motors"]), "freeze": parse_names(source["freeze"] or None)}
         options = {
             name: value
             for name, value in {**source, **lists}.items()
@@ -141,14 +141,14 @@ def view_server(found: View, port: int = 0, open_: bool = True, source: dict[str
         "hidden": found.derivation is not None,
     }
     server = StudioServer(
-        Opening(given=given, mechanism=robot if given is None else None, first=first, panels=False), port
+        StartupState(given=given, mechanism=robot if given is None else None, first=first, panels=False), port
     )
     if open_:
         server.show()
     return server
 
 
-def _as_read(robot: Mechanism) -> dict[str, Any] | None:
+def _describe_source(robot: Mechanism) -> dict[str, Any] | None:
     """Return a robot by its file, or by the name of a shipped one, if it equals that."""
     from ...description import list_robots, load
 
@@ -163,7 +163,7 @@ def _as_read(robot: Mechanism) -> dict[str, Any] | None:
     return {"robot": name, "options": {}} if replace(robot, camera=read.camera) == read else None
 
 
-def application(tabs: Tabs) -> Any:
+def build_application(tabs: Tabs) -> Any:
     """Its paths below the secret: the page, its files, the socket of a tab, and what is dropped into one."""
     from starlette.applications import Starlette
     from starlette.responses import JSONResponse, Response
@@ -207,7 +207,7 @@ class StudioServer:
     Raises ``BadRequest`` for a port that cannot be had (0: any that is free), ``MissingExtra``.
     """
 
-    def __init__(self, opening: Opening, port: int = 0, *, desk: str = DESK) -> None:
+    def __init__(self, opening: StartupState, port: int = 0, *, desk: str = DESK) -> None:
         require_libraries()
         listener = bound(port)
         self.forks = ForkServer(desk)  # while modules are loaded there, the server's are loaded here
@@ -256,7 +256,7 @@ def require_libraries() -> None:
 
 
 def make_server(
-    opening: Opening, port: int, forks: ForkServer
+    opening: StartupState, port: int, forks: ForkServer
 ) -> tuple[Server, Guard, tempfile.TemporaryDirectory[str]]:
     """The server, not started, who guards it, and the folder of what is dropped into its pages."""
     import h11
@@ -269,7 +269,7 @@ def make_server(
 
         def connection_made(self, transport: Any) -> None:
             super().connection_made(transport)
-            self.patience = self.loop.call_later(SENDER_SECONDS, self._give_up)
+            self.patience = self.loop.call_later(SENDER_TIMEOUT_S, self._give_up)
 
         def _give_up(self) -> None:
             if self.conn.their_state is h11.IDLE:
@@ -285,7 +285,7 @@ def make_server(
 
     folder = tempfile.TemporaryDirectory(prefix="hrsynth-", ignore_cleanup_errors=True)
     tabs = Tabs(forks, opening.write(Path(folder.name)), Path(folder.name))
-    guard = Guard(application(tabs), port)
+    guard = Guard(build_application(tabs), port)
     config = uvicorn.Config(
         guard,
         http=PatientProtocol,
@@ -297,10 +297,10 @@ def make_server(
         access_log=False,
         server_header=False,
         proxy_headers=False,
-        limit_concurrency=MOST_CONNECTIONS,
+        limit_concurrency=STUDIO_CONNECTIONS_MAX,
         ws_max_size=LARGEST_ASK,
         ws_per_message_deflate=False,
-        timeout_graceful_shutdown=int(FAREWELL_SECONDS),
+        timeout_graceful_shutdown=int(SERVER_CLOSE_TIMEOUT_S),
     )
     return uvicorn.Server(config), guard, folder
 
@@ -311,7 +311,7 @@ def bound(port: int) -> socket.socket:
     try:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind((HOST, port))
-        listener.listen(MOST_CONNECTIONS)
+        listener.listen(STUDIO_CONNECTIONS_MAX)
     except (OSError, OverflowError) as error:
         listener.close()
         reason = getattr(error, "strerror", None) or "no such port"

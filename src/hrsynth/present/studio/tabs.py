@@ -13,8 +13,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...budgets import ASK_SECONDS, MOST_TABS, MOVE_SECONDS
-from .processes import ForkServer, WorkerProcess, cancel_message, gone
+from ...budgets import MOVE_TIMEOUT_S, REQUEST_TIMEOUT_S, STUDIO_TABS_MAX
+from .processes import ForkServer, WorkerProcess, cancel_message, format_gone
 from .uploads import UploadFolder
 
 if TYPE_CHECKING:
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 
     from ...mechanism import Mechanism
 
-TRY_LATER = 1013
+SOCKET_TRY_LATER_CODE = 1013
 """Close code of a socket if too many are open."""
 MOVE, CANCEL = "move", "cancel"
 
 
 @dataclass(frozen=True)
-class Opening:
+class StartupState:
     """Content of a server: a folder of robots, a robot with its options as ``given`` (see ``AnalysisService``) or as a
     ``mechanism``, the first state of the page (``watch``, ``camera``, ``hidden``), and whether it has ``panels``."""
 
@@ -38,7 +38,7 @@ class Opening:
     first: dict[str, Any] = field(default_factory=dict)
     panels: bool = True
 
-    def write(self, folder: Path) -> Opening:
+    def write(self, folder: Path) -> StartupState:
         """Write the mechanism to a file in a folder, for the processes that read it."""
         if self.mechanism is None:
             return self
@@ -59,14 +59,14 @@ class Opening:
 class BrowserTab:
     """One tab, from the opening of its socket to the end."""
 
-    def __init__(self, socket: WebSocket, uploads: UploadFolder, forks: ForkServer, opening: Opening) -> None:
+    def __init__(self, socket: WebSocket, uploads: UploadFolder, forks: ForkServer, opening: StartupState) -> None:
         self.socket, self.uploads = socket, uploads
         folder = opening.folder
         setup = json.dumps(
             {"folder": None if folder is None else str(folder), "uploads": str(uploads.folder), "given": opening.given}
         ).encode()
         self.mover, self.desk = (
-            WorkerProcess(forks, setup, seconds, socket.send_text) for seconds in (MOVE_SECONDS, ASK_SECONDS)
+            WorkerProcess(forks, setup, seconds, socket.send_text) for seconds in (MOVE_TIMEOUT_S, REQUEST_TIMEOUT_S)
         )
 
     async def run(self) -> None:
@@ -91,13 +91,13 @@ class BrowserTab:
     def _route(self, text: str | None) -> str | None:
         """Queue a request, or cancel one; return the error message if that fails."""
         try:
-            asked = json.loads(text or "", parse_constant=_no_number)
+            asked = json.loads(text or "", parse_constant=_refuse_number)
             kind = asked["ask"]
             number = asked["of" if kind == CANCEL else "n"]
             if type(number) is not int or not isinstance(kind, str):
                 raise TypeError(number)
         except (ValueError, KeyError, TypeError, RecursionError):
-            return gone(
+            return format_gone(
                 None,
                 "invalid message: expected an object with a whole number n and the name ask of an analysis",
                 "Unknown",
@@ -105,10 +105,14 @@ class BrowserTab:
         if kind == CANCEL:
             return cancel_message(number) if self.mover.cancel(number) or self.desk.cancel(number) else None
         there = self.mover if kind == MOVE else self.desk
-        return None if there.ask(number, (text or "").encode()) else gone(number, "too many requests wait", "TooMany")
+        return (
+            None
+            if there.ask(number, (text or "").encode())
+            else format_gone(number, "too many requests wait", "TooMany")
+        )
 
 
-def _no_number(name: str) -> None:
+def _refuse_number(name: str) -> None:
     """Raise ``ValueError``: NaN and infinities are no JSON."""
     raise ValueError(name)
 
@@ -116,15 +120,15 @@ def _no_number(name: str) -> None:
 class Tabs:
     """All that are open."""
 
-    def __init__(self, forks: ForkServer, opening: Opening, folder: Path) -> None:
+    def __init__(self, forks: ForkServer, opening: StartupState, folder: Path) -> None:
         self.forks, self.opening, self.folder = forks, opening, folder
         self.open: dict[str, BrowserTab] = {}
 
     async def serve(self, socket: WebSocket) -> None:
         """A tab from its beginning to its end; its processes and files go with it."""
         await socket.accept()
-        if len(self.open) >= MOST_TABS:
-            await socket.close(TRY_LATER, f"{MOST_TABS} tabs are open")
+        if len(self.open) >= STUDIO_TABS_MAX:
+            await socket.close(SOCKET_TRY_LATER_CODE, f"{STUDIO_TABS_MAX} tabs are open")
             return
         name = secrets.token_urlsafe(12)
         uploads = UploadFolder(self.folder / name)

@@ -9,7 +9,7 @@ import secrets
 from collections.abc import AsyncIterator
 from pathlib import Path
 
-from ...budgets import LARGEST_UPLOAD, LONGEST_FILE_NAME, MOST_UPLOADS, SENDER_SECONDS, UPLOAD_SECONDS
+from ...budgets import FILE_NAME_MAX_BYTES, SENDER_TIMEOUT_S, UPLOAD_MAX_BYTES, UPLOAD_TIMEOUT_S, UPLOADED_FILES_MAX
 from ...errors import BadRequest, FileTooLarge
 
 NAME = re.compile(r"\w[\w .,()+@-]*")
@@ -28,14 +28,14 @@ class UploadFolder:
 
     def require(self, name: str, length: str | None) -> None:
         """Raise ``BadRequest`` for a name or a length that is refused, before anything is read."""
-        if not NAME.fullmatch(name) or name.endswith((" ", ".")) or len(name.encode()) > LONGEST_FILE_NAME:
+        if not NAME.fullmatch(name) or name.endswith((" ", ".")) or len(name.encode()) > FILE_NAME_MAX_BYTES:
             raise BadRequest("file name", name, "letters, digits, spaces and . , ( ) + @ - _, no folder")
         if length is not None and not (length.isascii() and length.isdecimal()):
             raise BadRequest("file length", length, "a whole number")
-        if length is not None and (len(length) > len(str(LARGEST_UPLOAD)) or int(length) > LARGEST_UPLOAD):
-            raise FileTooLarge(name, LARGEST_UPLOAD)
-        if len({*os.listdir(self.folder), *self.coming, name} - self._parts()) > MOST_UPLOADS:
-            raise BadRequest(f"{name}: more than {MOST_UPLOADS} files in one tab", remedy="Open another tab.")
+        if length is not None and (len(length) > len(str(UPLOAD_MAX_BYTES)) or int(length) > UPLOAD_MAX_BYTES):
+            raise FileTooLarge(name, UPLOAD_MAX_BYTES)
+        if len({*os.listdir(self.folder), *self.coming, name} - self._parts()) > UPLOADED_FILES_MAX:
+            raise BadRequest(f"{name}: more than {UPLOADED_FILES_MAX} files in one tab", remedy="Open another tab.")
 
     def _parts(self) -> set[str]:
         return {each for each in os.listdir(self.folder) if each.startswith(PART)}
@@ -45,16 +45,16 @@ class UploadFolder:
         part, size = self.folder / (PART + secrets.token_hex(8)), 0
         self.coming.add(name)
         try:
-            async with asyncio.timeout(UPLOAD_SECONDS):
+            async with asyncio.timeout(UPLOAD_TIMEOUT_S):
                 with part.open("xb") as file:
                     while True:
-                        async with asyncio.timeout(SENDER_SECONDS):
+                        async with asyncio.timeout(SENDER_TIMEOUT_S):
                             chunk = await anext(chunks, None)
                         if chunk is None:
                             break
                         size += len(chunk)
-                        if size > LARGEST_UPLOAD:
-                            raise FileTooLarge(name, LARGEST_UPLOAD)
+                        if size > UPLOAD_MAX_BYTES:
+                            raise FileTooLarge(name, UPLOAD_MAX_BYTES)
                         file.write(chunk)
             part.replace(self.folder / name)
         finally:

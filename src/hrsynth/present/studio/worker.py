@@ -37,7 +37,7 @@ WARMING, WARMING_PAUSE = ("watch", "open"), 3000
 without a child."""
 
 
-def fork_on_request(control: socket.socket, desk: Callable[..., Any]) -> None:
+def start_children(control: socket.socket, desk: Callable[..., Any]) -> None:
     """Fork a child for each channel that comes, until ``control`` is closed at the other end."""
     children: dict[int, socket.socket] = {}
     woken, waker = socket.socketpair()
@@ -46,7 +46,7 @@ def fork_on_request(control: socket.socket, desk: Callable[..., Any]) -> None:
     signal.set_wakeup_fd(waker.fileno(), warn_on_full_buffer=False)
     signal.signal(signal.SIGCHLD, lambda *_: None)
     warming = [*WARMING]
-    _warm(desk, warming.pop())
+    _load_answerers(desk, warming.pop())
     while True:
         poll = select.poll()
         for each in (control, woken):
@@ -56,7 +56,7 @@ def fork_on_request(control: socket.socket, desk: Callable[..., Any]) -> None:
             poll.register(number, 0)  # reports only that the other end is closed
         events = {number for number, _ in poll.poll(WARMING_PAUSE if warming else None)}
         if not events:
-            _warm(desk, warming.pop())
+            _load_answerers(desk, warming.pop())
         for number in events & left.keys():
             _kill(left[number])
         if woken.fileno() in events:
@@ -74,17 +74,17 @@ def fork_on_request(control: socket.socket, desk: Callable[..., Any]) -> None:
                     _kill(pid)
                 return
             for number in numbers:
-                _fork(socket.socket(fileno=number), children, [control, woken, waker], desk)
+                _start_child(socket.socket(fileno=number), children, [control, woken, waker], desk)
 
 
-def _warm(desk: Callable[..., Any], kind: str) -> None:
+def _load_answerers(desk: Callable[..., Any], kind: str) -> None:
     """Run an analysis, so that all its modules are loaded once, here."""
     with contextlib.suppress(Exception):
         desk(None, None, None).answer({"n": 0, "ask": kind, "robot": {"source": "shipped:" + SMALL}})
     gc.freeze()
 
 
-def _fork(
+def _start_child(
     channel: socket.socket, children: dict[int, socket.socket], others: list[socket.socket], desk: Callable[..., Any]
 ) -> None:
     """A child at a channel; where no process is to be had the other end sees the channel closed."""
@@ -94,7 +94,7 @@ def _fork(
         channel.close()
         return
     if pid == 0:
-        _child(channel, [*others, *children.values()], desk)
+        _serve_child(channel, [*others, *children.values()], desk)
     children[pid] = channel
     with contextlib.suppress(OSError):  # it may have done so itself
         os.setpgid(pid, pid)
@@ -107,7 +107,7 @@ def _kill(pid: int) -> None:
             end(pid, signal.SIGKILL)
 
 
-def _child(channel: socket.socket, others: list[socket.socket], desk: Callable[..., Any]) -> None:
+def _serve_child(channel: socket.socket, others: list[socket.socket], desk: Callable[..., Any]) -> None:
     """Serve a channel as a child, then exit."""
     status = 1
     try:
@@ -144,18 +144,18 @@ def answer_message(desk: Any, asked: dict[str, Any]) -> bytes:
         told = _encode({**reply, "answer": desk.answer(asked)})
         if len(told) <= LARGEST_ANSWER:
             return told
-        reply |= failure(f"the answer has {len(told)} bytes, at most {LARGEST_ANSWER} are sent", "TooLarge")
+        reply |= describe_failure(f"the answer has {len(told)} bytes, at most {LARGEST_ANSWER} are sent", "TooLarge")
     except HrsynthError as error:
-        reply |= failure("\n".join(error.lines()), type(error).__name__)
+        reply |= describe_failure("\n".join(error.lines()), type(error).__name__)
     except (MemoryError, RecursionError) as error:
-        reply |= failure(
+        reply |= describe_failure(
             f"the analysis needs more memory than the limit ({WORKER_BYTES >> 30} GB)", type(error).__name__
         )
     except Exception as error:
         if os.environ.get("HRSYNTH_DEBUG"):
             traceback.print_exc()
         what = " ".join(f"{type(error).__name__}: {error}".split())
-        reply |= failure(f"a defect of hrsynth itself, please report it: {what}", "Defect")
+        reply |= describe_failure(f"a defect of hrsynth itself, please report it: {what}", "Defect")
     return _encode(reply)
 
 
@@ -163,7 +163,7 @@ def _encode(message: dict[str, Any]) -> bytes:
     return name_steering(json.dumps(message, ensure_ascii=False, allow_nan=False)).encode()
 
 
-def failure(error: str, kind: str) -> dict[str, str]:
+def describe_failure(error: str, kind: str) -> dict[str, str]:
     """Return the fields of a message without an answer."""
     return {"error": error, "kind": kind}
 
@@ -184,5 +184,5 @@ def main(control: int, desk: str) -> None:
     gc.set_threshold(50_000)
     module, _, name = desk.partition(":")
     answers = getattr(import_module(module), name)
-    fork_on_request(socket.socket(fileno=control), answers)
+    start_children(socket.socket(fileno=control), answers)
     os._exit(0)  # no need to take all these modules down

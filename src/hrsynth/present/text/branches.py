@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .tables import Rows, listing, robot_row
+from .tables import Rows, format_listing, format_robot_row
 
 if TYPE_CHECKING:
     from ...analysis.branch.answer import BranchPart, BranchProof, Toggle
@@ -13,10 +13,10 @@ UNITS = "metres and radians"
 """Units of the motor intervals."""
 
 
-def branch(found: BranchProof) -> str:
+def format_branch(found: BranchProof) -> str:
     """Return the robot, then each part: its box, the proved fraction, and the ends of the proof."""
     rows: Rows = [
-        robot_row(found.robot),
+        format_robot_row(found.robot),
         ("motors", ", ".join(found.motors)),
         (
             "passive",
@@ -24,16 +24,16 @@ def branch(found: BranchProof) -> str:
         ),
         ("box", found.box),
         ("units", UNITS),
-        *limits(found),
+        *format_limit_rows(found),
     ]
     for part in found.parts:
-        rows += _part(part)
+        rows += _format_part(part)
     if not found.parts:
         rows.append(("branch", "no loops: the motors are the only joints"))
-    return listing(rows + _back(found))
+    return format_listing(rows + _format_inverse_rows(found))
 
 
-def limits(found: BranchProof) -> Rows:
+def format_limit_rows(found: BranchProof) -> Rows:
     """Return the row of joint limits: those of passive joints, and those of motors that the box exceeds."""
     words = found.limits_in_words()
     if beyond := found.motors_beyond():
@@ -41,7 +41,7 @@ def limits(found: BranchProof) -> Rows:
     return [("limits", words)] if words else []
 
 
-def _back(found: BranchProof) -> Rows:
+def _format_inverse_rows(found: BranchProof) -> Rows:
     """Return the rows of the inverse map, from the platform to the motors."""
     if not all(part.cells for part in found.parts):
         return []
@@ -72,7 +72,7 @@ def _back(found: BranchProof) -> Rows:
     return rows
 
 
-def _part(part: BranchPart) -> Rows:
+def _format_part(part: BranchPart) -> Rows:
     bounds = [
         f"{name} {low:.6g} to {high:.6g} (of {first:.6g} to {last:.6g})"
         for name, low, high, first, last in zip(part.motors, *part.proved, *part.requested_box, strict=True)
@@ -109,10 +109,10 @@ def _part(part: BranchPart) -> Rows:
                 ),
             )
         )
-    return rows + ends(part)
+    return rows + format_end_rows(part)
 
 
-def ends(part: BranchPart) -> Rows:
+def format_end_rows(part: BranchPart) -> Rows:
     """Return the row of the ends of a part's proof, with reasons."""
     return [("proof ends" if not place else "", _end(part, each)) for place, each in enumerate(part.toggles)]
 

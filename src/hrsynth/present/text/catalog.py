@@ -6,11 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from ...errors import BadRequest
-from .tables import listing, table
+from .tables import format_listing, format_table
 
 HEADS = ("key", "robot", "dof", "motion", "hidden robot", "verdict", "rank", "smallest leg sets, or reason of refusal")
 LEGEND = "* motor   ══ observed link"
-SHOWN = 100
+CATALOG_ENTRIES_PRINTED_MAX = 100
 """Entries of a list that are printed."""
 PROOFS = {"class": "no more by the degrees of their equations", "rank": "no more by ranks modulo a prime"}
 """Proofs of the bound on the number of modes other than a resultant."""
@@ -18,7 +18,7 @@ PROOFS = {"class": "no more by the degrees of their equations", "rank": "no more
 Record = Mapping[str, Any]
 
 
-def entries(records: Sequence[Record], total: int, groups: Sequence[str] = ()) -> str:
+def format_entries(records: Sequence[Record], total: int, groups: Sequence[str] = ()) -> str:
     """Return a row per entry, of the first ones if there are many, then their number and the groups searched."""
     tables = [name for name in groups if name[:1].isdigit()]
     count = f"{len(records)} of {total} architectures" + "".join(
@@ -29,16 +29,20 @@ def entries(records: Sequence[Record], total: int, groups: Sequence[str] = ()) -
         )
         if names
     )
-    if len(records) > SHOWN:
-        count += f", the first {SHOWN} shown (--json lists all; --legs, --motion, --verdict … restrict the list)"
-    return f"{table([_row(record) for record in records[:SHOWN]], HEADS)}\n\n{count}" if records else count
+    if len(records) > CATALOG_ENTRIES_PRINTED_MAX:
+        count += f", the first {CATALOG_ENTRIES_PRINTED_MAX} shown (--json lists all; --legs, --motion, --verdict … restrict the list)"
+    return (
+        f"{format_table([_format_row(record) for record in records[:CATALOG_ENTRIES_PRINTED_MAX]], HEADS)}\n\n{count}"
+        if records
+        else count
+    )
 
 
-def entry(record: Record, drawn: str, note: str = "", smallest: Sequence[Record] = ()) -> str:
+def format_entry(record: Record, drawn: str, note: str = "", smallest: Sequence[Record] = ()) -> str:
     """Return one entry: its legs drawn, then its data, with the hidden robots of its ``smallest`` sets."""
     head = f"{record['key']}   {record.get('notation', '')}".rstrip()
     legs = [f"{drawn}\n{LEGEND}"] if drawn else []
-    return "\n\n".join([head, *legs, listing(_all(record, smallest)), *filter(None, [note])])
+    return "\n\n".join([head, *legs, format_listing(_list_all_facts(record, smallest)), *filter(None, [note])])
 
 
 LISTED: Mapping[str, type] = {
@@ -56,7 +60,7 @@ def describe_built(groups: Iterable[Mapping[str, Any]]) -> str:
         (*(str(each[name]) for name in ("group", "keys", "now", "before")), each["file"] or "not complete")
         for each in groups
     ]
-    return table(rows, ("group", "keys", "computed now", "before", "file"))
+    return format_table(rows, ("group", "keys", "computed now", "before", "file"))
 
 
 def describe_site(done: Mapping[str, Any]) -> str:
@@ -75,7 +79,7 @@ def require_whole(record: Record, needed: Mapping[str, type]) -> None:
         )
 
 
-def _row(record: Record) -> tuple[str, ...]:
+def _format_row(record: Record) -> tuple[str, ...]:
     require_whole(record, LISTED)
     if "refused" in record:
         return (record["key"], record.get("notation", ""), "", "", "", "refused", "", str(record["refused"]))
@@ -87,21 +91,25 @@ def _row(record: Record) -> tuple[str, ...]:
         record.get("hidden", "none"),
         record["verdict"],
         f"{record['rank']} of {record['dof']}",
-        ": ".join(filter(None, [str(record["fewest"]), _sets(record)])),
+        ": ".join(filter(None, [str(record["fewest"]), _format_sets(record)])),
     )
 
 
-def _sets(record: Record) -> str:
+def _format_sets(record: Record) -> str:
     return "  ".join("{" + ", ".join(legs) + "}" for legs in record.get("minimal", ()))
 
 
-def _all(record: Record, smallest: Sequence[Record]) -> list[tuple[str, str]]:
-    found = [("group", str(record.get("group", ""))), *facts(record, smallest)]
-    found += [("motors", motors(record))] if "motors" in record else []
-    return [*found, ("motor choices", "  ".join(map(choice, record["choices"])))] if "choices" in record else found
+def _list_all_facts(record: Record, smallest: Sequence[Record]) -> list[tuple[str, str]]:
+    found = [("group", str(record.get("group", ""))), *list_facts(record, smallest)]
+    found += [("motors", describe_motors(record))] if "motors" in record else []
+    return (
+        [*found, ("motor choices", "  ".join(map(describe_motor_choice, record["choices"])))]
+        if "choices" in record
+        else found
+    )
 
 
-def facts(record: Record, smallest: Sequence[Record] = ()) -> Iterable[tuple[str, str]]:
+def list_facts(record: Record, smallest: Sequence[Record] = ()) -> Iterable[tuple[str, str]]:
     """Yield the data that do not depend on the motors, by name. ``smallest``: the smallest sets with their hidden
     robots."""
     require_whole(record, TOLD)
@@ -124,7 +132,7 @@ def facts(record: Record, smallest: Sequence[Record] = ()) -> Iterable[tuple[str
         yield "unobserved", "; ".join(record["unobserved"])
     told, what = ("fixed", "observations") if "sensors" in record else ("observed", "legs")
     if record.get("minimal"):
-        yield f"{what} needed", _sets(record)
+        yield f"{what} needed", _format_sets(record)
     if any(each["hidden"] != record.get("hidden") for each in smallest):
         yield (
             "hidden robots",
@@ -151,13 +159,13 @@ def facts(record: Record, smallest: Sequence[Record] = ()) -> Iterable[tuple[str
         yield "suggestion", str(record["suggestion"])
 
 
-def choice(each: Mapping[str, Any]) -> str:
+def describe_motor_choice(each: Mapping[str, Any]) -> str:
     """Describe the actuated joints of each leg, and the number of dof that they determine."""
     driven = [",".join(map(str, joints)) or "none" for joints in each["joints"]]
     return f"joint {driven[0] if len(set(driven)) == 1 else ' | '.join(driven)} of each leg: {each['rank']}"
 
 
-def motors(record: Record) -> str:
+def describe_motors(record: Record) -> str:
     """Describe the motors of an architecture: number, place, and the number of dof that they determine."""
     base = "all on the base" if record["base_motors"] else "not all on the base"
     rank = f"; they determine {record['motor_rank']} of {record['dof']} dof" if "motor_rank" in record else ""

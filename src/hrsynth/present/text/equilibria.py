@@ -8,28 +8,28 @@ from typing import TYPE_CHECKING
 
 from ...analysis.modes.near import degrees, measurement_bound
 from ...tolerances import MEASUREMENT_BOUND
-from .poses import all_of
-from .tables import GAP, Rows, camera, head, listing, name_all, table
+from .poses import describe_completeness
+from .tables import GAP, Rows, format_camera_rows, format_head_rows, format_listing, format_table, name_all
 
 if TYPE_CHECKING:
     from ...simulation.equilibria.equilibrium import CompletenessReport, Equilibria, Equilibrium, SignedModes
 
-LISTED_SADDLES = 12
+SADDLES_PRINTED_MAX = 12
 """Number of equilibria that are not stable up to which each is printed."""
 
 
-def equilibria(found: Equilibria) -> str:
+def format_equilibria(found: Equilibria) -> str:
     """Return the goal, the stable equilibria, some of the others, and what is known of completeness."""
     drawn = [each for each in found.points if each.stability in ("stable", "undecided")]
     others = [each for each in found.points if each.stability not in ("stable", "undecided")]
     boxed = [each for each in found.points if each.proved]
     rows: Rows = [
-        *head(found.setup),
-        *camera(found.setup),
+        *format_head_rows(found.setup),
+        *format_camera_rows(found.setup),
         ("goal", str(found.pose)),
         *([] if found.depth == "exact" else [("depth", f"{found.depth}, as the control law assumes it")]),
         *GAP,
-        ("stable", table(_lines(drawn)[0], HEADS).splitlines()),
+        ("stable", format_table(_group_lines(drawn)[0], HEADS).splitlines()),
         *GAP,
     ]
     if any(each.beyond_limits for each in drawn):
@@ -43,36 +43,36 @@ def equilibria(found: Equilibria) -> str:
             *GAP,
         ]
     if others:
-        lines, counts = _lines(others)
-        left = sum(counts[LISTED_SADDLES:])
-        told = table(lines[:LISTED_SADDLES], HEADS).splitlines()
+        lines, counts = _group_lines(others)
+        left = sum(counts[SADDLES_PRINTED_MAX:])
+        told = format_table(lines[:SADDLES_PRINTED_MAX], HEADS).splitlines()
         rows += [("other", [*told, *([f"and {left} more (--json lists them)"] if left > 0 else [])]), *GAP]
     rows += [("enclosures", _describe_enclosed(found, boxed)), *GAP]
-    rows += [("families", [f"‖e‖ = {each.error:.3g}, {each.stability}{_why(each)}" for each in found.families])]
+    rows += [("families", [f"‖e‖ = {each.error:.3g}, {each.stability}{_explain_row(each)}" for each in found.families])]
     rows += [
         (
             "all",
             [
-                *(_signs(each, found) for each in found.lists if _are_met(each)),
-                *_others(found, [each for each in found.lists if not _are_met(each)]),
-                *_complete(found),
+                *(_describe_signs(each, found) for each in found.lists if _has_poses(each)),
+                *_list_unmet_choices(found, [each for each in found.lists if not _has_poses(each)]),
+                *_describe_completeness(found),
             ],
         )
     ]
-    return listing(rows)
+    return format_listing(rows)
 
 
 HEADS = ("kind", "‖e‖", "", "pose", "")
 
 
-def _are_met(each: SignedModes) -> bool:
+def _has_poses(each: SignedModes) -> bool:
     """Return True if there are poses with these legs reversed."""
     return each.listed is not None or bool(each.boxes)
 
 
-def _others(found: Equilibria, unmet: list[SignedModes]) -> list[str]:
+def _list_unmet_choices(found: Equilibria, unmet: list[SignedModes]) -> list[str]:
     """Describe the combinations of reversed legs without any pose."""
-    proved = sum(each.empty for each in unmet)
+    proved = sum(each.is_proved_empty for each in unmet)
     if not unmet:
         return []
     what = (
@@ -82,10 +82,10 @@ def _others(found: Equilibria, unmet: list[SignedModes]) -> list[str]:
     )
     if proved < len(unmet):
         return [f"poses with {what}: none found, not proved"]
-    return [f"poses with {what}: none, proved by boxes of poses{_turned(found, unmet[0].turns)}"]
+    return [f"poses with {what}: none, proved by boxes of poses{_describe_rotations(found, unmet[0].turns)}"]
 
 
-def _complete(found: Equilibria) -> list[str]:
+def _describe_completeness(found: Equilibria) -> list[str]:
     """Describe the proof that the list is complete, or how the list was searched."""
     if found.subdivision is None:
         return [f"the other equilibria are found, not proved to be all: {found.search.words}"]
@@ -93,7 +93,7 @@ def _complete(found: Equilibria) -> list[str]:
         return [
             f"the other equilibria are found, not proved to be all: {found.search.words}",
             found.subdivision.reason,
-            *_alone(found.subdivision),
+            *_list_only_proved(found.subdivision),
         ]
     told, turns = found.subdivision, len(found.subdivision.result.turns)
     where = (
@@ -105,7 +105,7 @@ def _complete(found: Equilibria) -> list[str]:
         where += ", while the platform translates, in "
         where += f"{'the only orientation' if turns == 1 else f'all {turns} orientations'} in which it can"
     else:
-        where += _turned(found)
+        where += _describe_rotations(found)
     where += "" if told.shorter is None else f", no rod shorter than {1e3 * told.shorter:.3g} mm"
     apart = [f"the joints of {name_all('leg', told.result.unread)} lock"] if told.result.unread else []
     if told.unstretched is not None:
@@ -131,13 +131,13 @@ def _complete(found: Equilibria) -> list[str]:
         lines += [f"  ({', '.join(f'{round(float(x), places) + 0.0:g}' for x in p)}) m" for p, _ in told.locked]
     if told.outside_searched:
         lines += [f"{told.outside_searched} of the list lie outside the searched region"]
-    return [*lines, *_alone(told)]
+    return [*lines, *_list_only_proved(told)]
 
 
-def _alone(cover: CompletenessReport) -> list[str]:
+def _list_only_proved(cover: CompletenessReport) -> list[str]:
     """Describe the critical poses that only the boxes prove, minima of E first."""
     some = sorted(cover.only_proved, key=lambda each: each.stability in ("saddle", "unstable"))
-    left = len(some) - LISTED_SADDLES
+    left = len(some) - SADDLES_PRINTED_MAX
     return [
         *(
             [
@@ -147,7 +147,7 @@ def _alone(cover: CompletenessReport) -> list[str]:
             if some
             else []
         ),
-        *(f"  {each.stability} at {each.pose}, ‖e‖ = {each.error[0]:.3g}" for each in some[:LISTED_SADDLES]),
+        *(f"  {each.stability} at {each.pose}, ‖e‖ = {each.error[0]:.3g}" for each in some[:SADDLES_PRINTED_MAX]),
         *([f"  and {left} more (--json lists them)"] if left > 0 else []),
     ]
 
@@ -164,10 +164,10 @@ def _describe_enclosed(found: Equilibria, boxed: list[Equilibrium]) -> list[str]
     ]
 
 
-def _lines(rests: list[Equilibrium]) -> tuple[list[list[str]], list[int]]:
+def _group_lines(rests: list[Equilibrium]) -> tuple[list[list[str]], list[int]]:
     """Return a row per equilibrium; those with equal rows share one, with their number: they differ in unobserved rods
     or other links."""
-    rows = Counter(tuple(_line(each)) for each in rests)
+    rows = Counter(tuple(_format_line(each)) for each in rests)
     return [
         [
             *row,
@@ -179,7 +179,7 @@ def _lines(rests: list[Equilibrium]) -> tuple[list[list[str]], list[int]]:
     ], list(rows.values())
 
 
-def _line(each: Equilibrium) -> list[str]:
+def _format_line(each: Equilibrium) -> list[str]:
     notes = []
     if each.singular is not None and not each.orthogonal_legs:
         notes.append(each.singular.split(": " if each.boundary else "vanishes ")[-1])
@@ -210,20 +210,22 @@ def _line(each: Equilibrium) -> list[str]:
     ]
 
 
-def _signs(each: SignedModes, found: Equilibria) -> str:
-    what = "directions" if all(o.by_segment for o in found.setup.observed) else "measurements"
+def _describe_signs(each: SignedModes, found: Equilibria) -> str:
+    what = "directions" if all(o.is_segment_direction for o in found.setup.observed) else "measurements"
     which = f"with {name_all('leg', each.reversed)} reversed" if each.reversed else f"with the desired {what}"
     if each.listed is None:
         return f"poses {which}: found, not listed"
     if each.boxes is not None and not each.listed.found.complete:
-        return f"poses {which}: {each.boxes}, proved to be all by boxes of poses{_turned(found, each.turns)}"
+        return (
+            f"poses {which}: {each.boxes}, proved to be all by boxes of poses{_describe_rotations(found, each.turns)}"
+        )
     more = each.turns > 1 and each.boxes is not None
-    return f"poses {which}: {each.listed.count}, {all_of(each.listed)}" + (
+    return f"poses {which}: {each.listed.count}, {describe_completeness(each.listed)}" + (
         f"; {each.boxes} in the {each.turns} orientations in which the platform translates" if more else ""
     )
 
 
-def _turned(found: Equilibria, turns: int = 1) -> str:
+def _describe_rotations(found: Equilibria, turns: int = 1) -> str:
     """Describe the orientations that the boxes cover, of a platform that only translates; empty if it rotates."""
     if found.setup.motion.rotations.shape[1]:
         return ""
@@ -234,7 +236,7 @@ def _turned(found: Equilibria, turns: int = 1) -> str:
     )
 
 
-def _why(each: Equilibrium) -> str:
+def _explain_row(each: Equilibrium) -> str:
     return (
         f", {name_all('leg', each.orthogonal_legs)} orthogonal to the desired directions"
         if each.orthogonal_legs

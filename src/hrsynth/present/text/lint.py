@@ -36,13 +36,13 @@ def lint(found: Lint) -> str:
     return "\n".join([*lines, found.headline()])
 
 
-def github(found: Lint) -> str:
+def format_github(found: Lint) -> str:
     """Return a workflow command of GitHub per finding."""
     unread = [Finding("unread", "error", each.file, each.line, each.text) for each in found.unread]
-    return "\n".join(_command(each) for each in (*unread, *found.findings))
+    return "\n".join(_format_command(each) for each in (*unread, *found.findings))
 
 
-def _command(finding: Finding) -> str:
+def _format_command(finding: Finding) -> str:
     place: dict[str, object] = {"file": finding.file, "line": finding.line, "title": finding.rule}
     properties = ",".join(
         f"{key}={_escape(str(value), {':': '%3A', ',': '%2C'})}" for key, value in place.items() if value is not None
@@ -57,7 +57,7 @@ def _escape(text: str, more: Mapping[str, str] | None = None) -> str:
     return text
 
 
-def sarif(found: Lint) -> str:
+def format_sarif(found: Lint) -> str:
     """Return a log in the Static Analysis Results Interchange Format, version 2.1.0."""
     from ...linting.rules import lint_rules
 
@@ -84,21 +84,25 @@ def sarif(found: Lint) -> str:
             "ruleIndex": place[each.rule],
             "level": each.severity,
             "message": {"text": each.message},
-            "locations": [{"physicalLocation": _location(each)}],
+            "locations": [{"physicalLocation": _format_location(each)}],
         }
         for each in found.findings
     ]
     run = {"tool": {"driver": driver}, "columnKind": "unicodeCodePoints", "results": results}
     if found.unread:
         told = [
-            {"level": "error", "message": {"text": each.text}, "locations": [{"physicalLocation": _location(each)}]}
+            {
+                "level": "error",
+                "message": {"text": each.text},
+                "locations": [{"physicalLocation": _format_location(each)}],
+            }
             for each in found.unread
         ]
         run["invocations"] = [{"executionSuccessful": False, "toolExecutionNotifications": told}]
     return json.dumps({"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}, ensure_ascii=False, indent=2)
 
 
-def _location(finding: Finding | Defect) -> dict[str, Any]:
+def _format_location(finding: Finding | Defect) -> dict[str, Any]:
     path = Path(finding.file)
     uri = path.as_uri() if path.is_absolute() else quote(path.as_posix().replace(os.sep, "/"))
     region = {} if finding.line is None else {"region": {"startLine": int(finding.line)}}

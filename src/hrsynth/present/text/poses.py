@@ -15,22 +15,22 @@ from ...analysis.aspects.verdicts import UNDECIDED as UNDECIDED_PAIR
 from ...analysis.configuration_report import CONSTRAINT, REGULAR, UNDECIDED
 from ...constraints.condition import General
 from ...mechanism.pose import Pose
-from ...tolerances import NOISE, RANK_GAP
-from .robots import NO_MATRIX, formation
+from ...tolerances import INCIDENCE_TOL, RANK_GAP_MIN
+from .robots import NO_MATRIX, format_formation
 from .tables import (
     GAP,
     LINE,
-    NAMES,
     NOT_BOUNDED,
+    TABLE_NAME_COLUMNS_MAX,
     Rows,
-    camera,
+    check_bounded,
     describe_watched,
-    dropped_limits,
-    head,
-    is_bounded,
-    joint_rows,
-    known_row,
-    listing,
+    format_camera_rows,
+    format_dropped_limits,
+    format_head_rows,
+    format_joint_rows,
+    format_known_row,
+    format_listing,
     wrap_lines,
 )
 
@@ -61,28 +61,28 @@ def check(found: Check) -> str:
     seen = [f"{leg} ({', '.join(each)})" for leg, each in describe_watched(found.setup).items()]
     generic, written = found.setup.mobility, found.as_written
     rows = [
-        head(found.setup)[0],
+        format_head_rows(found.setup)[0],
         ("observed", seen),
-        *camera(found.setup),
-        *known_row(
+        *format_camera_rows(found.setup),
+        *format_known_row(
             "mobility",
             None
             if written in (None, generic)
             else f"{written.total} as the file is written, {generic.total} in normal form",
         ),
         ("lengths in", f"{found.length:.4g} m (the characteristic length), angles in radians"),
-        *dropped_limits(found.setup),
+        *format_dropped_limits(found.setup),
     ]
     for posture in found.postures:
-        rows += [*GAP, ("pose", str(posture.pose)), *_posture(posture, found.length, found.setup)]
+        rows += [*GAP, ("pose", str(posture.pose)), *_format_configuration(posture, found.length, found.setup)]
     for each in found.unreached:
         rows += [*GAP, ("pose", each.pose), ("not reached", each.reason)]
-    rows += [*GAP, _redundant_row(found)]
+    rows += [*GAP, _format_redundant_row(found)]
     if found.grid is not None:
         counts = Counter(found.grid.states)
         axes = zip(found.grid.grid.shape, found.grid.grid.names, strict=True)
         size = " × ".join(f"{count} {name}" for count, name in axes)
-        fixed, free = str(found.grid.grid.fixed), ", ".join(_free(found.grid))
+        fixed, free = str(found.grid.grid.fixed), ", ".join(_list_free_parts(found.grid))
         beyond = sum(bool(each.beyond_limits) for each in found.grid.postures if each is not None)
         rows.append(
             (
@@ -96,22 +96,22 @@ def check(found: Check) -> str:
                 ],
             )
         )
-    return listing(rows)
+    return format_listing(rows)
 
 
-def _redundant_row(found: Checked) -> tuple[str, str | list[str]]:
+def _format_redundant_row(found: Checked) -> tuple[str, str | list[str]]:
     """Return the row of the redundant constraints of each loop."""
     each_loop = [f"loop {each.loop}: {each.rows} of its constraints" for each in found.redundant]
     return "redundant", each_loop or "none"
 
 
-def loop_check(found: LoopCheck) -> str:
+def format_loop_check(found: LoopCheck) -> str:
     """Return the mobility and rank of the loops, and the options needed for more."""
     told = found.constraints
     values = [f"{told.rank} independent of {told.rows}; singular values relative to the largest:"]
     values += [f"smallest kept {told.smallest_kept:.2g}, largest dropped {told.largest_dropped:.1g} "]
-    values[1] += f"(gap {told.gap:.1e}, needed {RANK_GAP:.0e})"
-    return listing(
+    values[1] += f"(gap {told.gap:.1e}, needed {RANK_GAP_MIN:.0e})"
+    return format_listing(
         [
             ("robot", found.robot.name),
             (
@@ -119,16 +119,21 @@ def loop_check(found: LoopCheck) -> str:
                 f"{found.mobility.total}: {told.coordinates} coordinates, {told.rank} independent constraints",
             ),
             ("constraints", values if told.rank else f"rank 0 of {told.rows}"),
-            ("loops", wrap_lines(", ".join(told.loops), LINE - NAMES) if told.loops else "none, an open tree"),
-            _redundant_row(found),
+            (
+                "loops",
+                wrap_lines(", ".join(told.loops), LINE - TABLE_NAME_COLUMNS_MAX)
+                if told.loops
+                else "none, an open tree",
+            ),
+            _format_redundant_row(found),
             ("lengths in", f"{found.length:.4g} m (the characteristic length), angles in radians"),
             *GAP,
-            ("for more", [line for each in found.more for line in wrap_lines(each, LINE - NAMES)]),
+            ("for more", [line for each in found.more for line in wrap_lines(each, LINE - TABLE_NAME_COLUMNS_MAX)]),
         ]
     )
 
 
-def _free(grid: GridCheck) -> Iterator[str]:
+def _list_free_parts(grid: GridCheck) -> Iterator[str]:
     """Yield the coordinates that a grid leaves free, positions with their range."""
     poses = [each.pose for each in grid.postures if each is not None]
     for name in grid.free:
@@ -137,12 +142,12 @@ def _free(grid: GridCheck) -> Iterator[str]:
         yield name if not values else f"{name} = {low}" if low == high else f"{name} {low} to {high}"
 
 
-def _posture(posture: ConfigurationReport, length: float, setup: ObservedRobot) -> Rows:
-    shown = "directions" if all(each.by_segment for each in setup.observed) else "observations"
+def _format_configuration(posture: ConfigurationReport, length: float, setup: ObservedRobot) -> Rows:
+    shown = "directions" if all(each.is_segment_direction for each in setup.observed) else "observations"
     mobility, far, dof = posture.mobility, posture.distances, posture.dof
     whose = "bodies have" if setup.mechanism.formation else "platform has"
     rows = [
-        *joint_rows(posture.coordinates, posture.beyond_limits),
+        *format_joint_rows(posture.coordinates, posture.beyond_limits),
         *(
             (
                 "singular S",
@@ -155,7 +160,7 @@ def _posture(posture: ConfigurationReport, length: float, setup: ObservedRobot) 
             "mobility",
             f"{mobility.total}, of which {mobility.internal} internal; the {whose} {dof} dof",
         ),
-        *_kinds(
+        *_format_kinds(
             "hidden robot",
             f"the {shown} show {posture.hidden.rank} of {dof}",
             posture.hidden,
@@ -163,7 +168,7 @@ def _posture(posture: ConfigurationReport, length: float, setup: ObservedRobot) 
             whole=posture.hidden.rank == dof,
         ),
         *([] if posture.formation is None else [("verdict here", posture.formation.verdict)]),
-        *formation(posture.formation),
+        *format_formation(posture.formation),
     ]
     if far.condition is not None and far.type2 is not None and far.type1 is not None:
         rows += [
@@ -174,27 +179,32 @@ def _posture(posture: ConfigurationReport, length: float, setup: ObservedRobot) 
                 else []
             ),
         ]
-        if far.condition > 1 / NOISE:
+        if far.condition > 1 / INCIDENCE_TOL:
             rows.append(
-                ("", f"nearly singular: not distinguishable from a singularity with dimensions known to {NOISE:g}")
+                (
+                    "",
+                    f"nearly singular: not distinguishable from a singularity with dimensions known to {INCIDENCE_TOL:g}",
+                )
             )
     elif far.type2 is None:
         rows.append(("", NO_MATRIX))
     if posture.real is None:
         rows.append(("real robot", "no motors; name them with --motors"))
     else:
-        rows += _kinds("real robot", f"the motors determine {posture.real.rank} of {dof}", posture.real, "undetermined")
+        rows += _format_kinds(
+            "real robot", f"the motors determine {posture.real.rank} of {dof}", posture.real, "undetermined"
+        )
     if posture.constraint_singular:
         rows.append(("loops", ["lose rank here; the platform gains", *(freedom.name for freedom in posture.gained)]))
     rows += [("redundant here", f"loop {each.loop}: {each.rows} more of its constraints") for each in posture.redundant]
     return [*rows, ("loop Jacobian", f"smallest singular value {far.constraints:.3g}, relative to the largest")]
 
 
-def _kinds(name: str, what: str, kinds: SingularityReport, lost: str, *, whole: bool = True) -> Rows:
+def _format_kinds(name: str, what: str, kinds: SingularityReport, lost: str, *, whole: bool = True) -> Rows:
     state = STATES[kinds.state] if whole or kinds.state != REGULAR else "as many as at generic poses, not singular"
     if kinds.singularity_indices is not None and kinds.singularity_indices.RO < 0:
         state += f", but not generic: {-kinds.singularity_indices.RO} fewer unobserved than at generic poses"
-    title = f"{what}: {state} (smallest rank gap {kinds.gap:.1e}, needed {RANK_GAP:.0e})"
+    title = f"{what}: {state} (smallest rank gap {kinds.gap:.1e}, needed {RANK_GAP_MIN:.0e})"
     if kinds.singularity_indices is None:
         return [(name, title)]
     counts = "  ".join(f"{key} {value}" for key, value in kinds.singularity_indices.to_dict().items())
@@ -209,23 +219,23 @@ def _describe_gain(far: SingularityDistances, length: float, measured: str) -> s
     if (
         far.millimetres is None
         or far.degrees is None
-        or not (is_bounded(far.millimetres / 1e3, length) and is_bounded(math.radians(far.degrees)))
+        or not (check_bounded(far.millimetres / 1e3, length) and check_bounded(math.radians(far.degrees)))
     ):
         return f"{NOT_BOUNDED}, per degree of {measured} error"
     return (
-        f"{_small(far.millimetres)} mm and {_small(far.degrees)} deg per degree of {measured} error "
+        f"{_format_small(far.millimetres)} mm and {_format_small(far.degrees)} deg per degree of {measured} error "
         "(first order, least observable twist)"
     )
 
 
-def _small(value: float) -> str:
+def _format_small(value: float) -> str:
     return f"{0.0 if value < 1e-9 else value:.3g}"
 
 
-def singularity(found: Singularity) -> str:
+def format_singularity(found: Singularity) -> str:
     """Return the condition in words and as an expression, the checks, and singular poses."""
     condition, checked = found.condition, found.checked
-    name, seen = head(found.setup)
+    name, seen = format_head_rows(found.setup)
     motors = dict.fromkeys(str(getattr(o, "joint", o.link)) for o in found.observation_model.observations)
     rows: Rows = [
         name,
@@ -280,22 +290,22 @@ def singularity(found: Singularity) -> str:
             ],
         )
     )
-    return listing(rows)
+    return format_listing(rows)
 
 
-def modes(found: AssemblyModes) -> str:
+def format_modes(found: AssemblyModes) -> str:
     """Return the pose with the fixed measured values, the count with its proof, a block for each mode."""
     count = found.found
-    name, seen = head(found.setup)
+    name, seen = format_head_rows(found.setup)
     if found.formation is not None:
-        return _describe_formation(found, [name, seen, *formation(found.formation)])
+        return _describe_formation(found, [name, seen, *format_formation(found.formation)])
     rows = [name, *([seen] if found.kind == "hidden" else []), ("fixed", f"{_describe_held(found)} at {found.pose}")]
     if found.near_modes:
         rows += [
             ("alike", f"{found.alike} (found, not proved, for errors up to {np.degrees(found.measurement_bound):.3g}°)")
         ]
     if count.continuous_family is None or count.complex is None:
-        rows += [("modes", f"{found.count}, {all_of(found)}"), ("proof", count.proof)]
+        rows += [("modes", f"{found.count}, {describe_completeness(found)}"), ("proof", count.proof)]
     for each in count.snapped:
         legs = ", ".join(found.labels[k] for k in each.legs)
         rows.append(
@@ -305,7 +315,7 @@ def modes(found: AssemblyModes) -> str:
                 "use --as-written to keep the numbers)",
             )
         )
-    rows += [*known_row("singular", count.singular_solutions), *dropped_limits(found.setup)]
+    rows += [*format_known_row("singular", count.singular_solutions), *format_dropped_limits(found.setup)]
     for number, motion in enumerate(found.self_motions, 1):
         place = "the given pose" if motion.goal else str(found.pose_of(motion))
         starts = f"{motion.hits} start{'s' * (motion.hits > 1)}"
@@ -321,11 +331,11 @@ def modes(found: AssemblyModes) -> str:
                 f"mode {number}",
                 [
                     f"{mode.pose}" + ("   (the given pose)" if mode.goal else ""),
-                    proof_words(mode)
+                    describe_proof(mode)
                     if mode.match_residual is not None
-                    else f"{proof_words(mode)}, residual {mode.residual:.1e}",
-                    *ahead(mode),
-                    *at_mode(mode, found),
+                    else f"{describe_proof(mode)}, residual {mode.residual:.1e}",
+                    *describe_visibility(mode),
+                    *describe_at_mode(mode, found),
                 ],
             ),
         ]
@@ -336,8 +346,8 @@ def modes(found: AssemblyModes) -> str:
                 f"antipodal {number}",
                 [
                     f"{mode.pose}   not an assembly mode: opposite value of {', '.join(mode.opposite)}",
-                    proof_words(mode),
-                    *ahead(mode),
+                    describe_proof(mode),
+                    *describe_visibility(mode),
                 ],
             ),
         ]
@@ -348,20 +358,20 @@ def modes(found: AssemblyModes) -> str:
                 f"near {number}",
                 [
                     f"{mode.pose}   found, not proved; measured values differ {mode.differs}",
-                    *_rests(mode),
-                    *ahead(mode),
-                    *at_mode(mode, found),
+                    *_describe_equilibrium(mode),
+                    *describe_visibility(mode),
+                    *describe_at_mode(mode, found),
                 ],
             ),
         ]
-    return listing(rows)
+    return format_listing(rows)
 
 
 def _describe_formation(found: AssemblyModes, rows: Rows) -> str:
     """Return the count with its proof, and for each mode of a formation a block with the poses of all bodies."""
     if found.found.continuous_family is None:
-        rows += [("modes", f"{found.count}, {all_of(found)}"), ("proof", found.found.proof)]
-    rows += known_row("singular", found.found.singular_solutions)
+        rows += [("modes", f"{found.count}, {describe_completeness(found)}"), ("proof", found.found.proof)]
+    rows += format_known_row("singular", found.found.singular_solutions)
     for word, listed in (("mode", found.modes), ("antipodal", found.antipodal)):
         for number, mode in enumerate(listed, 1):
             told = [f"{body}: {Pose.of(X)}" for body, X in (mode.bodies or {}).items()]
@@ -378,30 +388,30 @@ def _describe_formation(found: AssemblyModes, rows: Rows) -> str:
                     ],
                 ),
             ]
-    return listing(rows)
+    return format_listing(rows)
 
 
 def _describe_held(found: AssemblyModes) -> str:
-    if found.kind == "hidden" and not all(o.by_segment for o in found.setup.observed):
+    if found.kind == "hidden" and not all(o.is_segment_direction for o in found.setup.observed):
         return "measured values"
     return _SINCE[found.kind]
 
 
-def _rests(mode: NearMode) -> list[str]:
+def _describe_equilibrium(mode: NearMode) -> list[str]:
     """Describe the equilibrium at a near mode."""
     if mode.family:
         return ["one of a continuous family: the loop may stop at any of them"]
     return ["a stable equilibrium of the loop"] if mode.stable else []
 
 
-def ahead(mode: AssemblyMode) -> list[str]:
+def describe_visibility(mode: AssemblyMode) -> list[str]:
     """Describe what is behind the cameras, or that nothing is."""
     if mode.behind is None:
         return []
     return [f"behind the camera: {', '.join(mode.behind)}" if mode.behind else "in front of the camera"]
 
 
-def all_of(found: AssemblyModes) -> str:
+def describe_completeness(found: AssemblyModes) -> str:
     """Describe whether the list of modes is complete."""
     if found.found.complete:
         fitting = sum(mode.match_residual is not None and not mode.goal for mode in found.modes)
@@ -411,7 +421,7 @@ def all_of(found: AssemblyModes) -> str:
     return "found, not proved to be all"
 
 
-def proof_words(mode: AssemblyMode) -> str:
+def describe_proof(mode: AssemblyMode) -> str:
     """Describe the enclosure of a mode, or why it has none."""
     within = (
         "" if not np.isfinite(mode.radius) else f"{mode.shift:.1e} m" + (f", {mode.turn:.1e} rad" if mode.turn else "")
@@ -430,10 +440,10 @@ def proof_words(mode: AssemblyMode) -> str:
     return f"{'a mode by construction, pose ' if mode.goal else ''}not proved, {known}"
 
 
-def at_mode(mode: AssemblyMode, found: AssemblyModes) -> list[str]:
+def describe_at_mode(mode: AssemblyMode, found: AssemblyModes) -> list[str]:
     """Describe the assembly of the real robot at a mode, its joints and its distance from a singularity."""
-    there, hidden = assembly(mode, found.setup.limits_ignored), found.kind == "hidden"
-    there += [f"{name} {told}" for name, told in joint_rows(mode.coordinates)]
+    there, hidden = describe_assembly(mode, found.setup.limits_ignored), found.kind == "hidden"
+    there += [f"{name} {told}" for name, told in format_joint_rows(mode.coordinates)]
     if mode.type2_distance is None:
         seen = NO_MATRIX if hidden else "the motors can move there while the platform is fixed"
         return [*there, *[seen] * (mode.configuration is not None)]
@@ -441,7 +451,7 @@ def at_mode(mode: AssemblyMode, found: AssemblyModes) -> list[str]:
     return [*there, f"smallest singular value of {matrix} {mode.type2_distance:.3g}"]
 
 
-def assembly(mode: AssemblyMode, unlimited: Sequence[str] = ()) -> list[str]:
+def describe_assembly(mode: AssemblyMode, unlimited: Sequence[str] = ()) -> list[str]:
     """Describe whether the real robot can be assembled at a mode; the limits of ``unlimited`` joints are ignored."""
 
     def several(noun: str, labels: Sequence[str]) -> str:
@@ -468,16 +478,16 @@ def assembly(mode: AssemblyMode, unlimited: Sequence[str] = ()) -> list[str]:
     return [f"the real robot was found assembled there only {where}; another assembly is not excluded"]
 
 
-def path(found: PathAnswer) -> str:
+def format_path(found: PathAnswer) -> str:
     """Return the verdict with its reason, the values at the two poses, and the path."""
     value = "expression" if found.signed else "smallest singular value"
     rows = [
-        *head(found.setup),
+        *format_head_rows(found.setup),
         ("from", f"{found.start.pose}   ({value} {found.start.value:.4g})"),
-        *joint_rows(found.start.coordinates),
+        *format_joint_rows(found.start.coordinates),
         ("to", f"{found.goal.pose}   ({value} {found.goal.value:.4g})"),
-        *joint_rows(found.goal.coordinates),
-        *known_row("", "start and goal are the same pose: no path needed" if found.stays else None),
+        *format_joint_rows(found.goal.coordinates),
+        *format_known_row("", "start and goal are the same pose: no path needed" if found.is_at_goal else None),
         ("verdict", [f"{found.verdict} ({'proved' if found.certified else 'not proved'})", found.reason]),
     ]
     if found.margin is not None:
@@ -489,11 +499,11 @@ def path(found: PathAnswer) -> str:
         ("crossings", [f"leg {leg} changes its working mode at {found.poses[place]}" for leg, place in found.crossings])
     )
     if found.road is not None:
-        rows.append(("sampled", road(found.road, value)))
-    return listing([*rows, *known_row("not proved", found.not_proved if found.certified else None)])
+        rows.append(("sampled", describe_straight_path(found.road, value)))
+    return format_listing([*rows, *format_known_row("not proved", found.not_proved if found.certified else None)])
 
 
-def road(found: SampledRoute, value: str) -> list[str]:
+def describe_straight_path(found: SampledRoute, value: str) -> list[str]:
     """Describe the samples on the straight path."""
     signs = {None: "", 0: ", the same sign at all"}.get(found.changes, f", {found.changes} sign changes")
     lines = [
@@ -507,16 +517,16 @@ def road(found: SampledRoute, value: str) -> list[str]:
 _SIGNS = {SAME: "=", SEPARATED: "|", UNDECIDED_PAIR: "?"}
 
 
-def aspects(found: AspectTable) -> str:
+def format_aspects(found: AspectTable) -> str:
     """Return the modes, their aspects, the table of pairs, and the verdict on each pair that was examined."""
     listed = found.listed
-    rows = [*head(listed.setup), ("fixed", f"{_describe_held(listed)} at {listed.pose}")]
+    rows = [*format_head_rows(listed.setup), ("fixed", f"{_describe_held(listed)} at {listed.pose}")]
     if listed.found.continuous_family is not None:
-        return listing([*rows, *known_row("singular", listed.found.singular_solutions)])
+        return format_listing([*rows, *format_known_row("singular", listed.found.singular_solutions)])
     rows += [
-        ("modes", f"{listed.count}, {all_of(listed)}"),
-        ("aspects", f"{found.aspects_met} of the hidden robot: {aspect_groups(found)}"),
-        ("cuspidal", _cuspidal(found)),
+        ("modes", f"{listed.count}, {describe_completeness(listed)}"),
+        ("aspects", f"{found.aspects_met} of the hidden robot: {format_aspect_groups(found)}"),
+        ("cuspidal", _describe_cuspidal(found)),
         *GAP,
     ]
     numbers = range(1, len(found.places) + 1)
@@ -536,15 +546,15 @@ def aspects(found: AspectTable) -> str:
     ]
     paths = [pair.answer for pair in found.pairs if pair.verdict == SAME and pair.answer is not None]
     passed = ", ".join(dict.fromkeys(name for each in paths for name in each.limits_ignored))
-    return listing([*rows, *known_row("not proved", f"joint limits of {passed}" if passed else None)])
+    return format_listing([*rows, *format_known_row("not proved", f"joint limits of {passed}" if passed else None)])
 
 
-def aspect_groups(found: AspectTable) -> str:
+def format_aspect_groups(found: AspectTable) -> str:
     """List the modes of each aspect."""
     return "; ".join(f"mode{'s' * (len(group) > 1)} {', '.join(map(str, group))}" for group in found.groups)
 
 
-def _cuspidal(found: AspectTable) -> list[str]:
+def _describe_cuspidal(found: AspectTable) -> list[str]:
     changes = found.changes
     if not changes:
         return ["not shown by the modes at this pose; other poses are not examined"]

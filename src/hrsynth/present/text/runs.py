@@ -9,23 +9,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...analysis.accuracy.ranges import ErrorRange
-from ...batch.grids import poses_over
+from ...batch.grids import list_grid_poses
 from ...geometry.vectors import Array
 from ...mechanism.pose import Grid, Pose
-from ...tolerances import DAMPED, LARGEST_FIRST_ORDER, SAME_RELATION
+from ...tolerances import CONTROLLER_DAMPING_MIN, FIRST_ORDER_POSE_ERROR_MAX, RELATION_ANGLE_TOL
 from .tables import (
     GAP,
     NOT_BOUNDED,
     Rows,
-    camera,
-    dropped_limits,
-    head,
-    is_bounded,
-    joint_rows,
-    known_row,
+    check_bounded,
+    format_camera_rows,
+    format_dropped_limits,
+    format_head_rows,
+    format_joint_rows,
+    format_known_row,
+    format_listing,
+    format_table,
     label_of,
-    listing,
-    table,
 )
 
 if TYPE_CHECKING:
@@ -41,13 +41,13 @@ if TYPE_CHECKING:
     from ...simulation.equilibria.basins import Basins
     from ...simulation.result import Servo
 
-PARTS_FROM_LINEAR = 0.1
+LINEAR_ERROR_DIFFERENCE_TOL = 0.1
 """Relative difference above which samples contradict the linear law."""
-NEAR_SINGULARITY = 0.1
+NEAR_SINGULARITY_FRACTION = 0.1
 """Fraction of its value at the pose below which a smallest singular value indicates a singularity."""
 
 
-def servo(found: Servo) -> str:
+def format_run(found: Servo) -> str:
     """Return start and goal, the outcome with its reason, the noise, and the crossings."""
     from ...simulation.crossings import CONSTRAINT, LIMIT, TYPE_1, TYPE_2
 
@@ -59,7 +59,7 @@ def servo(found: Servo) -> str:
     }
     run, track, off = found.run, found.track, found.from_goal
     rows = [
-        *head(found.setup),
+        *format_head_rows(found.setup),
         ("from", str(found.start)),
         ("to", str(found.goal)),
         (
@@ -68,14 +68,14 @@ def servo(found: Servo) -> str:
             + ("" if found.depth == "exact" else f", depth: {found.depth}")
             + ("" if found.noise is None else f", noise {found.noise}"),
         ),
-        *dropped_limits(found.setup),
+        *format_dropped_limits(found.setup),
         *GAP,
         ("outcome", [f"{found.outcome} after {run.times[-1]:.3g} s", found.run_outcome.reason]),
         ("at", str(found.pose)),
-        *joint_rows(found.coordinates),
+        *format_joint_rows(found.coordinates),
     ]
     if found.outcome != "goal":
-        rows.append(("", f"{1e3 * off[0]:.4g} mm and {_degrees(off[1])} deg from the goal"))
+        rows.append(("", f"{1e3 * off[0]:.4g} mm and {_format_degrees(off[1])} deg from the goal"))
     if found.run_outcome.modes is not None:
         rows.append(
             (
@@ -94,11 +94,11 @@ def servo(found: Servo) -> str:
         rows.append(
             (
                 "noise",
-                f"within {1e3 * s.metres:.3g} mm and {_degrees(s.radians)} deg of this pose in this run, "
-                f"root mean square {1e3 * s.rms_metres:.2g} mm and {_degrees(s.rms_radians)} deg",
+                f"within {1e3 * s.metres:.3g} mm and {_format_degrees(s.radians)} deg of this pose in this run, "
+                f"root mean square {1e3 * s.rms_metres:.2g} mm and {_format_degrees(s.rms_radians)} deg",
             )
         )
-        if s.aside:
+        if s.has_bias:
             rows.append(
                 (
                     "",
@@ -118,7 +118,7 @@ def servo(found: Servo) -> str:
         for each in track.passages or ()
     ]
     if track.passages == ():
-        met = smallest is not None and smallest < DAMPED
+        met = smallest is not None and smallest < CONTROLLER_DAMPING_MIN
         rows.append(
             (
                 "",
@@ -127,20 +127,20 @@ def servo(found: Servo) -> str:
                 else "no singularity of the hidden robot crossed",
             )
         )
-    return listing(rows)
+    return format_listing(rows)
 
 
-def basins(found: Basins) -> str:
+def format_basins(found: Basins) -> str:
     """Return the goal, the starts, the outcomes with their shares, and the method."""
     from ...simulation.equilibria.basins import LETTERS, hindrances
 
     size = " × ".join(f"{count} {name}" for count, name in zip(found.grid.shape, found.grid.names, strict=True))
     rows = [
-        *head(found.setup),
-        *camera(found.setup),
+        *format_head_rows(found.setup),
+        *format_camera_rows(found.setup),
         ("to", str(found.goal)),
         ("starts", f"{found.starts:,} of {size}: {replace(found.grid, fixed=Pose())}"),
-        *known_row("fixed", describe_held(found.grid, found.setup, found.batched)),
+        *format_known_row("fixed", describe_held(found.grid, found.setup, found.batched)),
         *GAP,
     ]
     lines = [
@@ -154,7 +154,9 @@ def basins(found: Basins) -> str:
         ]
         for letter, each in zip(LETTERS, found.ends, strict=False)
     ]
-    rows.append(("outcomes", table(lines, ("", "outcome", "starts", "share", "at", "example start")).splitlines()))
+    rows.append(
+        ("outcomes", format_table(lines, ("", "outcome", "starts", "share", "at", "example start")).splitlines())
+    )
     rows += [
         ("reasons" if number == 0 else "", f"{letter}: {each.run_outcome.reason}")
         for number, (letter, each) in enumerate(zip(LETTERS, found.ends, strict=False))
@@ -179,76 +181,76 @@ def basins(found: Basins) -> str:
         part = f": {100 * found.covered:.2g} % of the part of its basin that is drawn" if drawn else ""
         farther = found.certified.undamped_words
         rows.append(("proved radius", [f"{found.certified.words}{part}", *([farther] if farther else [])]))
-    return listing(rows)
+    return format_listing(rows)
 
 
-def _degrees(angle: float) -> str:
+def _format_degrees(angle: float) -> str:
     return f"{round(math.degrees(angle), 6):.2g}"
 
 
-def accuracy(found: Accuracy) -> str:
+def format_accuracy(found: Accuracy) -> str:
     """Return the measurement bounds, the range of errors over a grid, a block for each single pose."""
-    name, _ = head(found.setup)
+    name, _ = format_head_rows(found.setup)
     rows = [
         name,
         (
             "observed",
             ", ".join(f"{label_of(o)} {found.bounds.words(i, o)}" for i, o in enumerate(found.setup.observed)),
         ),
-        *camera(found.setup),
+        *format_camera_rows(found.setup),
         ("errors", f"largest over all errors {found.bounds.inside}, to first order"),
-        *dropped_limits(found.setup),
+        *format_dropped_limits(found.setup),
     ]
     length = found.setup.all_samples.model.length
     if found.field is not None:
-        rows += [*GAP, *field_rows(found), *_limits_left(found)]
+        rows += [*GAP, *format_field_rows(found), *_format_ignored_limits(found)]
     if found.swept is not None:
-        rows += [*GAP, *_swept_rows(found, found.swept), *_limits_left(found)]
+        rows += [*GAP, *_format_swept_rows(found, found.swept), *_format_ignored_limits(found)]
     for errors, true in zip(found.poses, found.sampled, strict=True):
         rows += [
             *GAP,
             ("pose", str(errors.pose)),
-            *joint_rows(errors.coordinates, errors.beyond_limits),
-            *_extent("position", errors.position, 1e3, "mm", length),
-            *_extent("orientation", errors.orientation, 180 / np.pi, "deg"),
-            *([] if true is None else _samples(errors, true)),
+            *format_joint_rows(errors.coordinates, errors.beyond_limits),
+            *_format_extent("position", errors.position, 1e3, "mm", length),
+            *_format_extent("orientation", errors.orientation, 180 / np.pi, "deg"),
+            *([] if true is None else _format_samples(errors, true)),
         ]
-    return listing(rows)
+    return format_listing(rows)
 
 
-def _limits_left(found: Accuracy) -> Rows:
+def _format_ignored_limits(found: Accuracy) -> Rows:
     """Return the row of joint limits that a grid does not check."""
     limited = ", ".join(found.setup.mechanism.stops)
     return [("limits", f"those of {limited} are not checked")] if limited else []
 
 
-def field_rows(found: Accuracy) -> Rows:
+def format_field_rows(found: Accuracy) -> Rows:
     """Return the rows of a grid: size, reached poses, range of the errors, check."""
     field, length = found.field, found.setup.all_samples.model.length
     assert field is not None
     ranges = [
-        ErrorRange.of(field.position, LARGEST_FIRST_ORDER * length),
-        ErrorRange.of(field.orientation, LARGEST_FIRST_ORDER),
+        ErrorRange.of(field.position, FIRST_ORDER_POSE_ERROR_MAX * length),
+        ErrorRange.of(field.orientation, FIRST_ORDER_POSE_ERROR_MAX),
     ]
-    position = _range(ranges[0], field.position, 1e3, "mm")
-    orientation = _range(ranges[1], field.orientation, 180 / np.pi, "deg")
+    position = _format_range(ranges[0], field.position, 1e3, "mm")
+    orientation = _format_range(ranges[1], field.orientation, 180 / np.pi, "deg")
     reached = f"{np.sum(field.reached)} of {field.reached.size}"
     reached += f"; {field.dependent}" if field.dependent else ""
-    return _grid_rows(found, field.grid, reached, position, orientation, field.spots, field.gap)
+    return _format_grid_rows(found, field.grid, reached, position, orientation, field.spots, field.gap)
 
 
-def _swept_rows(found: Accuracy, swept: SweptErrors) -> Rows:
+def _format_swept_rows(found: Accuracy, swept: SweptErrors) -> Rows:
     """Return the rows of a grid that is in a file, without medians."""
     tally = swept.tally
     reached = f"{tally.reached} of {swept.grid.size}" + (
         f" ({swept.before} from an interrupted sweep)" if swept.before else ""
     )
-    return _grid_rows(
+    return _format_grid_rows(
         found,
         swept.grid,
         reached,
-        _range(tally.position, None, 1e3, "mm"),
-        _range(tally.orientation, None, 180 / np.pi, "deg"),
+        _format_range(tally.position, None, 1e3, "mm"),
+        _format_range(tally.orientation, None, 180 / np.pi, "deg"),
         swept.spots,
         tally.gap,
     )
@@ -265,7 +267,7 @@ def describe_held(grid: Grid, setup: ObservedRobot, as_at_home: bool) -> str | N
             if not free
             else (f"{typed or 'nothing'}; free, chosen nearest to the zero configuration: {free}")
         )
-    ends, _ = poses_over(motion, grid, setup.robot.name, grid.places_at(np.array([0, grid.size - 1])))
+    ends, _ = list_grid_poses(motion, grid, setup.robot.name, grid.places_at(np.array([0, grid.size - 1])))
     first, last = (dict(part.split("=") for part in str(motion.pose(X)).split(",")) for X in ends)
     given = dict(part.split("=") for part in typed.split(",") if part)
     turned = {"phi", "rpy"} & {*grid.names, *given}
@@ -280,7 +282,7 @@ def describe_held(grid: Grid, setup: ObservedRobot, as_at_home: bool) -> str | N
     )
 
 
-def _grid_rows(
+def _format_grid_rows(
     found: Accuracy, grid: Grid, reached: str, position: str, orientation: str, spots: SpotChecks | None, gap: float
 ) -> Rows:
     size = " × ".join(f"{count} {name}" for count, name in zip(grid.shape, grid.names, strict=True))
@@ -289,7 +291,7 @@ def _grid_rows(
     )
     rows = [
         ("poses", f"{size}: {ranges}"),
-        *known_row("fixed", describe_held(grid, found.setup, spots is not None)),
+        *format_known_row("fixed", describe_held(grid, found.setup, spots is not None)),
         ("reached", reached),
         ("position", position),
         ("orientation", orientation),
@@ -298,19 +300,19 @@ def _grid_rows(
         rows.append(
             ("checked", f"against Pinocchio at {spots.count} random poses, largest difference {spots.difference:.1e}")
         )
-    return [*rows, *(("", line) for line in _bounds(found.bounds, "nowhere", gap))]
+    return [*rows, *(("", line) for line in _describe_bounds(found.bounds, "nowhere", gap))]
 
 
-def _bounds(blur: MeasurementBounds, where: str, gap: float) -> list[str]:
+def _describe_bounds(blur: MeasurementBounds, where: str, gap: float) -> list[str]:
     """Return a note on bounds that may be too large."""
     return (
-        [f"three {blur.each}s or more: upper bounds, {where} more than {_percent(gap)} % too large"]
-        if (gap > SAME_RELATION)
+        [f"three {blur.each}s or more: upper bounds, {where} more than {_format_percent(gap)} % too large"]
+        if (gap > RELATION_ANGLE_TOL)
         else []
     )
 
 
-def _range(found: ErrorRange, errors: Array | None, unit: float, word: str) -> str:
+def _format_range(found: ErrorRange, errors: Array | None, unit: float, word: str) -> str:
     if not found.moves:
         return "no error: the platform has no such motion"
     text = []
@@ -324,14 +326,14 @@ def _range(found: ErrorRange, errors: Array | None, unit: float, word: str) -> s
     )
 
 
-def _samples(errors: PoseErrors, true: NonlinearCheck) -> Rows:
+def _format_samples(errors: PoseErrors, true: NonlinearCheck) -> Rows:
     met = (
         f"smallest singular value of Mᵀ {true.smallest_singular_value:.3g}"
         if np.isfinite(true.smallest_singular_value)
         else "no Mᵀ"
     )
     if np.isfinite(true.usual):
-        near = not true.smallest_singular_value >= max(NEAR_SINGULARITY * true.usual, DAMPED)
+        near = not true.smallest_singular_value >= max(NEAR_SINGULARITY_FRACTION * true.usual, CONTROLLER_DAMPING_MIN)
         met += f", at the pose {true.usual:.3g}" + (": near a singularity" if near else "")
     else:
         met += "; no Mᵀ at the pose: observed links move while the platform is fixed"
@@ -347,47 +349,49 @@ def _samples(errors: PoseErrors, true: NonlinearCheck) -> Rows:
     if true.not_found:
         lines.append(f"{true.not_found} of them were not tracked to the end, as the solver stopped")
     whole = not true.not_found
-    if _apart(true.position, errors.position, whole) or _apart(true.orientation, errors.orientation, whole):
+    if _is_linear_unreliable(true.position, errors.position, whole) or _is_linear_unreliable(
+        true.orientation, errors.orientation, whole
+    ):
         lines.append("they contradict the maxima above, which are unreliable here")
     return [("samples", lines)]
 
 
-def _extent(name: str, extent: ErrorEllipsoid, unit: float, word: str, length: float = 1.0) -> Rows:
+def _format_extent(name: str, extent: ErrorEllipsoid, unit: float, word: str, length: float = 1.0) -> Rows:
     if not np.isfinite(extent.largest):
         return [(name, "infinite: a dof is unobserved here")]
-    if not is_bounded(extent.largest, length):
+    if not check_bounded(extent.largest, length):
         return [(name, f"{NOT_BOUNDED}: the cones are too large here, or a singularity is near")]
     if extent.direction is None:
         return [(name, "no error: the platform has no such motion")]
-    lines = [f"{unit * extent.largest:.4g} {word}, along {_vector(extent.direction)}"]
-    if extent.gap > SAME_RELATION:
-        lines.append(f"an upper bound, at most {_percent(extent.gap)} % too large")
+    lines = [f"{unit * extent.largest:.4g} {word}, along {_format_vector(extent.direction)}"]
+    if extent.gap > RELATION_ANGLE_TOL:
+        lines.append(f"an upper bound, at most {_format_percent(extent.gap)} % too large")
     if extent.anisotropy is not None and extent.least_direction is not None:
         lines.append(
-            f"least along {_vector(extent.least_direction)}: {unit * extent.least:.4g} {word}, anisotropy "
+            f"least along {_format_vector(extent.least_direction)}: {unit * extent.least:.4g} {word}, anisotropy "
             f"{extent.anisotropy:.3g}"
         )
     return [(name, lines)]
 
 
-def _percent(gap: float) -> str:
+def _format_percent(gap: float) -> str:
     """Format a fraction as per cent with two digits, rounded up."""
     step = 10.0 ** (math.floor(math.log10(100 * gap)) - 1)
     return f"{math.ceil(100 * gap / step) * step:.2g}"
 
 
-def _apart(true: float, linear: ErrorEllipsoid, whole: bool) -> bool:
+def _is_linear_unreliable(true: float, linear: ErrorEllipsoid, whole: bool) -> bool:
     """Return True if the largest sampled error contradicts the linear one; a smaller one does so only if the samples
     were tracked to the ``whole`` of their errors."""
     apart = true - linear.largest if not whole else abs(true - linear.largest)
-    return np.isfinite(linear.largest) and apart > PARTS_FROM_LINEAR * max(linear.largest, 1e-12)
+    return np.isfinite(linear.largest) and apart > LINEAR_ERROR_DIFFERENCE_TOL * max(linear.largest, 1e-12)
 
 
-def _vector(vector: Array) -> str:
+def _format_vector(vector: Array) -> str:
     return " ".join(f"{value + 0.0:.3f}" for value in np.round(vector, 3))
 
 
-def selection(found: Selection) -> str:
+def format_selection(found: Selection) -> str:
     """Return the displacement, the table of sets, the reasons for discarded ones."""
     observed, sight, blur = found.setup.observed, found.visible_from is not None, found.bounds
     length = found.setup.all_samples.model.length
@@ -397,7 +401,7 @@ def selection(found: Selection) -> str:
         if len(cones) == 1
         else ", ".join(f"{o.leg} {np.degrees(cone):.4g}°" for o, cone in zip(observed, blur.cones, strict=True))
     )
-    name, _ = head(found.setup)
+    name, _ = format_head_rows(found.setup)
     wrong = (
         ("cones", f"{angle} about each direction")
         if blur.noise is None
@@ -408,14 +412,14 @@ def selection(found: Selection) -> str:
         ("from", str(found.start)),
         ("to", str(found.goal)),
         wrong,
-        *dropped_limits(found.setup),
+        *format_dropped_limits(found.setup),
         ("sets", f"{len(found.candidates)}, kept: {len(found.kept)}"),
     ]
     if found.unexamined:
         rows.append(("", f"not examined: {len(found.unexamined)} ({found.left})"))
     if found.visible_from is not None:
         rows.append(("camera", f"on {found.visible_from.reference}"))
-    blocks = [listing(rows)]
+    blocks = [format_listing(rows)]
     if found.kept:
         heads = [
             "legs" if blur.noise is None else "observed",
@@ -428,7 +432,7 @@ def selection(found: Selection) -> str:
             *(["visible"] if sight else []),
             "run",
         ]
-        blocks.append(table([_row(each, sight, length) for each in found.kept], heads))
+        blocks.append(format_table([_format_row(each, sight, length) for each in found.kept], heads))
         blocks.append(
             "others: stable equilibria found besides the goal; proved: radius around the goal within\n"
             "which runs in its working mode are proved to end at it; mm, deg: largest errors at the\n"
@@ -451,40 +455,40 @@ def selection(found: Selection) -> str:
         if (errors := each.errors) is not None
         for part in (errors.position, errors.orientation)
     ]
-    blocks += _bounds(blur, "none", max(gaps, default=0.0))
+    blocks += _describe_bounds(blur, "none", max(gaps, default=0.0))
     if found.unexamined:
         blocks.append(
-            table(
-                [[_row(each, sight, length)[i] for i in (0, 3, 4)] for each in found.unexamined],
+            format_table(
+                [[_format_row(each, sight, length)[i] for i in (0, 3, 4)] for each in found.unexamined],
                 ["not examined", "mm", "deg"],
             )
         )
     discarded = [each for each in found.candidates if each.discarded is not None]
     if discarded:
         blocks.append(
-            table([(", ".join(each.legs), str(each.discarded)) for each in discarded], ("discarded", "reason"))
+            format_table([(", ".join(each.legs), str(each.discarded)) for each in discarded], ("discarded", "reason"))
         )
     return "\n\n".join(blocks)
 
 
-def _row(each: Candidate, sight: bool, length: float) -> list[str]:
+def _format_row(each: Candidate, sight: bool, length: float) -> list[str]:
     errors = each.errors
     assert errors is not None
     seen = [] if not sight else ["–" if each.seen is None else f"{100 * min(each.seen.values()):.0f} %"]
     position, orientation = errors.position.largest, errors.orientation.largest
     return [
         ", ".join(each.legs),
-        *_ends(each.equilibria),
-        f"{1e3 * position:.4g}" if is_bounded(position, length) else "not bounded",
-        f"{np.degrees(orientation):.4g}" if is_bounded(orientation) else "not bounded",
-        f"{_modes(each.start_modes)} / {_modes(each.goal_modes)}",
+        *_describe_ends(each.equilibria),
+        f"{1e3 * position:.4g}" if check_bounded(position, length) else "not bounded",
+        f"{np.degrees(orientation):.4g}" if check_bounded(orientation) else "not bounded",
+        f"{_describe_modes(each.start_modes)} / {_describe_modes(each.goal_modes)}",
         "–" if each.aspect is None else each.aspect.verdict,
         *seen,
         "–" if each.run is None else each.run.verdict,
     ]
 
 
-def _ends(ends: LoopEnds | None) -> list[str]:
+def _describe_ends(ends: LoopEnds | None) -> list[str]:
     """Return the number of other stable equilibria, and the proved attraction radius."""
     if ends is None or ends.others is None:
         return ["–", "–"]
@@ -495,5 +499,5 @@ def _ends(ends: LoopEnds | None) -> list[str]:
     return [str(len(ends.others)), f"{1e3 * ends.length:.3g} mm{turn}"]
 
 
-def _modes(modes: ModeCount | None) -> str:
+def _describe_modes(modes: ModeCount | None) -> str:
     return "–" if modes is None or modes.count is None else f"{modes.count} ({modes.reachable})"

@@ -9,7 +9,7 @@ import textwrap
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from ...tolerances import LARGEST_FIRST_ORDER
+from ...tolerances import FIRST_ORDER_POSE_ERROR_MAX
 
 if TYPE_CHECKING:
     from ...analysis.observed import ObservedRobot
@@ -23,33 +23,33 @@ GAP: Rows = [("", "")]
 """An empty line."""
 LINE, LEAST = 100, 30
 """Width of a table, and smallest width of its last column, which is wrapped."""
-NAMES = 14
+TABLE_NAME_COLUMNS_MAX = 14
 """Width of the column of names, at most."""
 
 
-def csv_bytes(rows: Iterable[Iterable[Any]]) -> bytes:
+def encode_csv(rows: Iterable[Iterable[Any]]) -> bytes:
     """Format rows, headers first, as comma-separated values."""
     stream = io.StringIO()
     csv.writer(stream, lineterminator="\n").writerows(rows)
     return stream.getvalue().encode()
 
 
-def width(text: str) -> int:
+def measure_width(text: str) -> int:
     """Return the width of ``text`` in columns (combining low lines have none)."""
     return sum(1 for character in text if character != "\u0332")
 
 
-def table(rows: Sequence[Sequence[str]], heads: Sequence[str]) -> str:
+def format_table(rows: Sequence[Sequence[str]], heads: Sequence[str]) -> str:
     """Format columns separated by two spaces, a rule below the headers, the last column wrapped."""
-    before = sum(max(width(row[i]) for row in (heads, *rows)) + 2 for i in range(len(heads) - 1))
+    before = sum(max(measure_width(row[i]) for row in (heads, *rows)) + 2 for i in range(len(heads) - 1))
     all_samples = [list(heads)]
     for *cells, last in rows:
         first, *more = wrap_lines(last, max(LINE - before, LEAST))
         all_samples += [[*cells, first], *([*[""] * len(cells), line] for line in more)]
-    columns = [max(width(row[i]) for row in all_samples) for i in range(len(heads))]
+    columns = [max(measure_width(row[i]) for row in all_samples) for i in range(len(heads))]
 
     def line(row: Sequence[str]) -> str:
-        cells = [cell + " " * (columns[i] - width(cell)) for i, cell in enumerate(row)]
+        cells = [cell + " " * (columns[i] - measure_width(cell)) for i, cell in enumerate(row)]
         return "  ".join(cells).rstrip()
 
     return "\n".join([line(heads), "  ".join("-" * size for size in columns), *map(line, all_samples[1:])])
@@ -62,7 +62,7 @@ def wrap_lines(text: str, columns: int = LINE, more: str = "") -> list[str]:
     return [line.replace("\u00a0", " ") for line in lines] or [""]
 
 
-def listing(rows: Iterable[tuple[str, str | Sequence[str]]]) -> str:
+def format_listing(rows: Iterable[tuple[str, str | Sequence[str]]]) -> str:
     """Format a line per value, the values below each other, the name before the first."""
     lines = [
         (name if i == 0 else "", value)
@@ -83,22 +83,22 @@ def name_all(noun: str, words: Sequence[str]) -> str:
     return f"{noun}{'s' * (len(words) > 1)} {list_words(words)}"
 
 
-def is_bounded(error: Any, length: float = 1.0) -> Any:
+def check_bounded(error: Any, length: float = 1.0) -> Any:
     """Return True for a displacement (m, with a characteristic ``length``) or a rotation (rad) that is small enough for
     the first order."""
-    return error <= LARGEST_FIRST_ORDER * length
+    return error <= FIRST_ORDER_POSE_ERROR_MAX * length
 
 
-def known_row(name: str, value: str | None) -> Rows:
+def format_known_row(name: str, value: str | None) -> Rows:
     """Return a row, none if the value is None."""
     return [] if value is None else [(name, value)]
 
 
-def joint_rows(found: FileCoordinates | None, beyond: Sequence[str] = ()) -> Rows:
+def format_joint_rows(found: FileCoordinates | None, beyond: Sequence[str] = ()) -> Rows:
     """Return the rows of motor and joint coordinates of a configuration, and of those beyond joint limits."""
     rows = [] if found is None else [("motors", found.motors), ("joints", found.joints)]
     told = [(name, ", ".join(f"{joint} {write_value(x)}" for joint, x in each.items())) for name, each in rows if each]
-    return [*told, *known_row("limits", f"exceeded: {', '.join(beyond)}" if beyond else None)]
+    return [*told, *format_known_row("limits", f"exceeded: {', '.join(beyond)}" if beyond else None)]
 
 
 def write_value(value: float | tuple[float, ...]) -> str:
@@ -106,29 +106,29 @@ def write_value(value: float | tuple[float, ...]) -> str:
     return "/".join(f"{round(x, 9) + 0.0:.6g}" for x in (value if isinstance(value, tuple) else (value,)))
 
 
-def dropped_limits(setup: ObservedRobot) -> Rows:
+def format_dropped_limits(setup: ObservedRobot) -> Rows:
     """Return the row of joints whose limits are ignored."""
     joints = ", ".join(setup.limits_ignored)
     return [("limits", f"ignored: {joints}, as they are parts of other joints")] if joints else []
 
 
-def robot_row(robot: Mechanism, words: str = "") -> tuple[str, list[str]]:
+def format_robot_row(robot: Mechanism, words: str = "") -> tuple[str, list[str]]:
     """Return the row of the robot, its platform and how that was chosen."""
     return "robot", [f"{robot.name}   {words}".rstrip(), f"platform: {robot.platform_words}"]
 
 
-def head(found: ObservedRobot) -> Rows:
+def format_head_rows(found: ObservedRobot) -> Rows:
     """Return the rows of the robot and its observations."""
     seen = ", ".join(label_of(each).replace(" ", "\u00a0") for each in found.observed)
     return [
-        robot_row(found.robot, str(found.decomposition.architecture())),
-        ("observed", wrap_lines(seen, LINE - NAMES)),
+        format_robot_row(found.robot, str(found.decomposition.architecture())),
+        ("observed", wrap_lines(seen, LINE - TABLE_NAME_COLUMNS_MAX)),
     ]
 
 
 def label_of(observation: Observation) -> str:
     """Return the label of an observation, with its kind."""
-    return f"{observation.leg} ({observation.link if observation.by_segment else describe_observation(observation)})"
+    return f"{observation.leg} ({observation.link if observation.is_segment_direction else describe_observation(observation)})"
 
 
 def describe_observation(observation: Observation) -> str:
@@ -146,24 +146,24 @@ def describe_observation(observation: Observation) -> str:
 
 def describe_watched(found: ObservedRobot) -> dict[str, list[str]]:
     """Return the observed links of each leg with the axis in the link frame, and the reason of the choice."""
-    from ...analysis.freedoms import point_text
+    from ...analysis.freedoms import format_point
 
     told: dict[str, list[str]] = {}
     for o, why in found.observed_axes():
         said = o.to_dict()
         places = {"at": said["at"], "along": said["axis"]}
-        where = "".join(f" {word} {point_text(at)}" for word, at in places.items() if at is not None)
-        what = o.link if o.by_segment else describe_observation(o)
+        where = "".join(f" {word} {format_point(at)}" for word, at in places.items() if at is not None)
+        what = o.link if o.is_segment_direction else describe_observation(o)
         told.setdefault(o.leg, []).append(f"{what}{where}{' of its frame' * bool(where)}, {why}")
     return told
 
 
-def camera(found: ObservedRobot) -> Rows:
+def format_camera_rows(found: ObservedRobot) -> Rows:
     """Return the row of the link that carries the camera, unless it is the base."""
     reference = found.mechanism.reference
-    return known_row("camera on", reference if reference != found.mechanism.base else None)
+    return format_known_row("camera on", reference if reference != found.mechanism.base else None)
 
 
-def sets(found: Iterable[Iterable[str]]) -> list[str]:
+def format_sets(found: Iterable[Iterable[str]]) -> list[str]:
     """Format sets of names in braces."""
     return ["{" + ", ".join(each) + "}" for each in found]

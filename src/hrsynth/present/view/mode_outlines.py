@@ -11,11 +11,11 @@ from ...analysis.modes.assembly_mode import AssemblyMode
 from ...analysis.modes.modes import modes
 from ...analysis.observed import ObservedRobot
 from ...errors import HrsynthError
-from ...geometry.vectors import Array, inverse
+from ...geometry.vectors import Array, invert_pose
 from ...mechanism.pose import Pose
 from ...records import Recorded
 from ...results import Value
-from .states import page_values, place
+from .states import place, round_page_values
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -41,7 +41,7 @@ class ModeOutline(Value):
 
     def scene(self) -> dict[str, Any]:
         """Return the data for the page."""
-        places = [None if each is None else page_values(each[None])[0] for each in self.places]
+        places = [None if each is None else round_page_values(each[None])[0] for each in self.places]
         return {
             "label": self.label,
             "words": self.words + f" (assembled: {self.assembly})" * (self.assembly != "yes"),
@@ -50,7 +50,7 @@ class ModeOutline(Value):
         }
 
 
-def mode_outlines(setup: ObservedRobot) -> tuple[tuple[ModeOutline, ...], tuple[str, ...]]:
+def list_mode_outlines(setup: ObservedRobot) -> tuple[tuple[ModeOutline, ...], tuple[str, ...]]:
     """Return all other modes, and notes if there are none or the list is incomplete."""
     try:
         found = modes(setup)
@@ -61,10 +61,10 @@ def mode_outlines(setup: ObservedRobot) -> tuple[tuple[ModeOutline, ...], tuple[
     notes = () if found.found.complete else ("more assembly modes may exist than are listed",)
     listed = [(str(number), mode) for number, mode in enumerate(found.modes, 1) if not mode.goal]
     listed += [(f"near {number}", mode) for number, mode in enumerate(found.near_modes, 1)]
-    return tuple(outline(setup, *each) for each in listed), notes
+    return tuple(build_mode_outline(setup, *each) for each in listed), notes
 
 
-def outline(setup: ObservedRobot, label: str, mode: AssemblyMode) -> ModeOutline:
+def build_mode_outline(setup: ObservedRobot, label: str, mode: AssemblyMode) -> ModeOutline:
     """Return the outline of an assembly mode with its ``label``."""
 
     def where(link: str) -> Array | None:
@@ -74,7 +74,7 @@ def outline(setup: ObservedRobot, label: str, mode: AssemblyMode) -> ModeOutline
             X = mode.bodies[link]
         else:
             return None
-        return place(X @ inverse(setup.mechanism.links[link].pose))
+        return place(X @ invert_pose(setup.mechanism.links[link].pose))
 
     places = tuple(where(link) for link in setup.mechanism.links)
     return ModeOutline(label, mode.pose, mode.reachable, mode.assembly, places)

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from ...analysis.accuracy.measurement_bounds import MeasurementBounds
-from ...analysis.accuracy.pose_errors import largest_by_ascent
+from ...analysis.accuracy.pose_errors import search_largest_errors
 from ...analysis.observed import ObservedRobot
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism.observations.direction import Direction
-from ...results import finite
-from ..text.tables import NOT_BOUNDED, is_bounded
+from ...results import drop_infinite
+from ..text.tables import NOT_BOUNDED, check_bounded
 
 CONE = math.radians(0.1)
 """Half-angle of the errors of each observed direction (rad)."""
@@ -26,7 +26,7 @@ SIGNS = {"mm": " mm", "deg": "°"}
 LOST = "a dof is unobserved: the error is unbounded"
 
 
-def unit_of(setup: ObservedRobot) -> str:
+def choose_error_unit(setup: ObservedRobot) -> str:
     """Return the unit of a platform's error: degrees if it only rotates."""
     return "mm" if setup.motion.translations.shape[1] else "deg"
 
@@ -36,19 +36,19 @@ def step_of(value: float | None, unit: str) -> int:
     return len(NAMES) - 1 if value is None else int(np.searchsorted(STEPS[unit], value, side="right"))
 
 
-def error(setup: ObservedRobot, at: ClosedConfiguration) -> dict[str, Any]:
-    """Compute the largest error of the platform at a configuration (:func:`.largest_by_ascent`), None if not bounded to
-    first order."""
-    unit = unit_of(setup)
+def describe_pose_error(setup: ObservedRobot, at: ClosedConfiguration) -> dict[str, Any]:
+    """Compute the largest error of the platform at a configuration (:func:`.search_largest_errors`), None if not
+    bounded to first order."""
+    unit = choose_error_unit(setup)
     if not all(isinstance(each, Direction) for each in setup.observed):
-        return {**nothing(unit, "unknown: an observation is not a direction"), "step": None}
-    metres, radians = largest_by_ascent(
+        return {**describe_no_error(unit, "unknown: an observation is not a direction"), "step": None}
+    metres, radians = search_largest_errors(
         at, setup.samples.observation_model, MeasurementBounds(np.full(len(setup.observed), CONE))
     )
-    if np.isfinite([metres, radians]).all() and not (is_bounded(metres, at.model.length) and is_bounded(radians)):
-        return nothing(unit, NOT_BOUNDED)
+    if np.isfinite([metres, radians]).all() and not (check_bounded(metres, at.model.length) and check_bounded(radians)):
+        return describe_no_error(unit, NOT_BOUNDED)
     return describe_error(
-        finite(1e3 * metres), finite(math.degrees(radians)), unit, bool(setup.motion.rotations.shape[1])
+        drop_infinite(1e3 * metres), drop_infinite(math.degrees(radians)), unit, bool(setup.motion.rotations.shape[1])
     )
 
 
@@ -70,7 +70,7 @@ def describe_error(mm: float | None, deg: float | None, unit: str, turns: bool) 
     }
 
 
-def nothing(unit: str, words: str) -> dict[str, Any]:
+def describe_no_error(unit: str, words: str) -> dict[str, Any]:
     """Return the record without an error, with the reason."""
     return {"mm": None, "deg": None, "unit": unit, "step": len(NAMES) - 1, "words": words}
 

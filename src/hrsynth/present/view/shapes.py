@@ -16,17 +16,17 @@ import numpy as np
 from ...geometry.vectors import Array
 from ...mechanism import Joint, JointType, Mechanism
 from ...results import Value
-from ...tolerances import SAME_POINT
-from ..skeleton import outline
+from ...tolerances import POINT_DISTANCE_TOL
+from ..skeleton import trace_link_outline
 
 BASE, LEG, PLATFORM, VIRTUAL = "base", "leg", "platform", "virtual"
 JOINT, MOTOR, ACTUATOR = "joint", "motor", "actuator"
 """What a link is, and what a joint is: passive, driven by the robot's motor, or a virtual actuator."""
-RADIUS = 0.022
+ROD_RADIUS_FRACTION = 0.022
 """Of rods (characteristic lengths); the other shapes are multiples of it."""
 OUTER, INNER, PLAIN = 1.5, 0.7, 1.0
 """Of a rod in which another slides, of what slides in it, and of the others."""
-PAGE_DIGITS = 7
+PAGE_DIGITS_COUNT = 7
 """Digits of metres that the page is given."""
 
 
@@ -55,7 +55,7 @@ class Shape(Value):
             "link": places[self.link],
             "role": self.role,
             "size": self.size,
-            "points": np.round(self.points, PAGE_DIGITS).tolist(),
+            "points": np.round(self.points, PAGE_DIGITS_COUNT).tolist(),
         }
         if self.other is not None:
             record["other"] = places[self.other]
@@ -89,7 +89,7 @@ class Drawer(Value):
     def sliders(self) -> Iterator[Joint]:
         """The joints that slide on the base."""
         for joint in map(self._from_base, self.mechanism.joints.values()):
-            if joint.type.slides and joint.predecessor == self.mechanism.base:
+            if joint.type.has_translation and joint.predecessor == self.mechanism.base:
                 yield joint
 
     def _from_base(self, joint: Joint) -> Joint:
@@ -108,30 +108,34 @@ class Drawer(Value):
         a virtual rod to each joint that the real robot does not have there."""
         role, size = self.role(link), self.radius * self._thickness(link)
         shown = self.real if link in self.real.links else self.mechanism
-        ring = outline(shown, link, shown.links[link].pose) if shown.joints_of(link) else np.zeros((0, 3))
-        if len(ring) > 3 and role in (BASE, PLATFORM) and _area(ring) > SAME_POINT * self.real.length**2:
+        ring = trace_link_outline(shown, link, shown.links[link].pose) if shown.joints_of(link) else np.zeros((0, 3))
+        if (
+            len(ring) > 3
+            and role in (BASE, PLATFORM)
+            and _compute_area(ring) > POINT_DISTANCE_TOL * self.real.length**2
+        ):
             yield Shape("plate", link, ring[:-1], size, role)
         for start, end in [(ring[0], ring[1])] if len(ring) == 3 else list(pairwise(ring)) if len(ring) > 3 else []:
             yield Shape("rod", link, np.array([start, end]), size, role)
         for joint in self.mechanism.joints_of(link) if len(ring) else ():
             nearest = min(ring, key=lambda corner, joint=joint: float(np.linalg.norm(corner - joint.point)))  # type: ignore[misc]
-            if np.linalg.norm(nearest - joint.point) > SAME_POINT * self.real.length:
+            if np.linalg.norm(nearest - joint.point) > POINT_DISTANCE_TOL * self.real.length:
                 yield Shape("rod", link, np.array([nearest, joint.point]), self.radius, VIRTUAL)
 
     def _thickness(self, link: str) -> float:
         for joint in self.mechanism.joints_of(link):
-            if joint.type.slides and self.mechanism.base not in joint.links:
+            if joint.type.has_translation and self.mechanism.base not in joint.links:
                 return OUTER if link == joint.predecessor else INNER
         return PLAIN
 
     def _symbol(self, joint: Joint) -> Iterator[Shape]:
         """The symbol of a joint, once: on the link that slides where it slides, else on the first."""
         r, point, type = self.radius, joint.point, joint.type
-        role = JOINT if not joint.actuated else ACTUATOR if joint.name not in self.real.joints else MOTOR
+        role = JOINT if not joint.is_actuated else ACTUATOR if joint.name not in self.real.joints else MOTOR
 
         def made(kind: str, half: float, size: float, axes: Iterable[Array]) -> Shape:
             ends = [point + side * half * r * axis for axis in axes for side in (-1, 1)]
-            link = joint.successor if type.slides else joint.predecessor
+            link = joint.successor if type.has_translation else joint.predecessor
             return Shape(kind, link, np.array(ends or [point]), size * r, role, joint.name)
 
         if type is JointType.REVOLUTE:
@@ -153,13 +157,13 @@ class Drawer(Value):
         if joint.name in travels:
             ends = np.array([joint.point + way * joint.axis for way in travels[joint.name]])
             yield Shape("rail", joint.predecessor, ends, 0.6 * self.radius, BASE if role is LEG else role)
-        elif joint.type.slides:
+        elif joint.type.has_translation:
             yield Shape(
                 "span", joint.predecessor, np.array([joint.point] * 2), INNER * self.radius, role, other=joint.successor
             )
 
 
-def _area(ring: Array) -> float:
+def _compute_area(ring: Array) -> float:
     """Twice the area of a closed polygon (n, 3)."""
     v = ring - ring[0]
     return float(np.linalg.norm(np.cross(v[:-1], v[1:]).sum(axis=0)))

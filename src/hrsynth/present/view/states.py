@@ -14,35 +14,35 @@ import numpy as np
 
 from ...analysis.configuration_report import ConfigurationAnalysis
 from ...analysis.observed import ObservedRobot
-from ...budgets import APPROACH, FOLLOWING
-from ...geometry.vectors import Array, inverse
+from ...budgets import DRAG_APPROACH_STEPS_COUNT, VIEW_TRACKING_ITERATIONS_MAX
+from ...geometry.vectors import Array, invert_pose
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.continuation import approach, track
 from ...kinematics.coordinates import Coordinates
 from ...kinematics.pinocchio_model import PinocchioModel
 from ...kinematics.platform_motion import PoseTask
-from ...kinematics.tasks import PoseAndValuesTask, solve, system
+from ...kinematics.tasks import PoseAndValuesTask, solve, stack_task
 from ...mechanism import Mechanism
 from ...records import As, Number, Recorded, Shown
 from ...results import Value
-from ...tolerances import FOLLOWED, SOLVED
-from .scale import error
-from .shapes import PAGE_DIGITS
-from .sights import ShownSight, shown_sights
+from ...tolerances import CLOSURE_SOLVER_TOL, HIDDEN_ROBOT_RESIDUAL_TOL
+from .scale import describe_pose_error
+from .shapes import PAGE_DIGITS_COUNT
+from .sights import ShownSight, list_shown_observations
 
 REAL, HIDDEN = "real", "hidden"
 TURN, WAY = 1.0, 1.0
 """Largest rotation (rad) and translation (characteristic lengths) of a slider, in each direction."""
-BEYOND_SLIDERS = 100.0
+SLIDER_DISTANCE_MAX = 100.0
 """Largest displacement that is accepted, in multiples of these."""
-STEPS = 10
+SLIDER_CONFIGURATIONS_COUNT = 10
 """Configurations of a slider on each side of the zero configuration."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ViewState(Value):
     """Displacements (links, 7) of each machine's links, smallest singular value of Mᵀ (characteristic lengths; None if
-    Mᵀ does not exist), error of the platform (:func:`.error`) if requested, and observations."""
+    Mᵀ does not exist), error of the platform (:func:`.describe_pose_error`) if requested, and observations."""
 
     places: Mapping[str, Array]
     distance: float | None
@@ -52,7 +52,7 @@ class ViewState(Value):
     def scene(self) -> dict[str, Any]:
         """Return the data for the page."""
         return {
-            **{key: page_values(places) for key, places in self.places.items()},
+            **{key: round_page_values(places) for key, places in self.places.items()},
             "distance": None if self.distance is None else float(f"{self.distance:.5g}"),
             **({} if self.error is None else {"error": dict(self.error)}),
             **({"sights": [each.scene() for each in self.sights]} if self.sights else {}),
@@ -74,7 +74,7 @@ class Slider(Value):
 
     def scene(self) -> dict[str, Any]:
         """Return the data for the page."""
-        values = [round(value, PAGE_DIGITS) for value in self.values]
+        values = [round(value, PAGE_DIGITS_COUNT) for value in self.values]
         return {
             "name": self.name,
             "label": self.name,
@@ -86,7 +86,7 @@ class Slider(Value):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Posed(Value):
+class RealAndHiddenState(Value):
     """Configuration of the real robot with the coordinates (nq,) of the hidden one."""
 
     real: ClosedConfiguration
@@ -111,28 +111,28 @@ class Mover(Value):
         return cls(setup, coordinates, ConfigurationAnalysis.of(setup), model)
 
     @property
-    def home(self) -> Posed:
+    def home(self) -> RealAndHiddenState:
         """Return the zero configuration."""
-        return Posed(self.setup.all_samples.start, None if self.hidden is None else self.hidden.q0)
+        return RealAndHiddenState(self.setup.all_samples.start, None if self.hidden is None else self.hidden.q0)
 
-    def state(self, at: Posed) -> ViewState:
+    def state(self, at: RealAndHiddenState) -> ViewState:
         """Return what the page shows of a configuration."""
-        sights = shown_sights(self.setup, at.real)
+        sights = list_shown_observations(self.setup, at.real)
         return ViewState(self.places(at), self.examiner.classify(at.real).distances.type2, sights=sights)
 
-    def places(self, at: Posed) -> dict[str, Array]:
+    def places(self, at: RealAndHiddenState) -> dict[str, Array]:
         """Return the displacements (links, 7) of each machine's links."""
-        places = {REAL: displacements(self.setup.mechanism, at.real.pose)}
+        places = {REAL: compute_link_displacements(self.setup.mechanism, at.real.pose)}
         if self.hidden is not None and at.hidden is not None:
             q = at.hidden
-            places[HIDDEN] = displacements(self.hidden.mechanism, lambda link: self.hidden.pose(q, link))
+            places[HIDDEN] = compute_link_displacements(self.hidden.mechanism, lambda link: self.hidden.pose(q, link))
         return places
 
-    def with_error(self, at: Posed) -> ViewState:
+    def with_error(self, at: RealAndHiddenState) -> ViewState:
         """Return the state with the error of the platform."""
-        return replace(self.state(at), error=error(self.setup, at.real))
+        return replace(self.state(at), error=describe_pose_error(self.setup, at.real))
 
-    def send(self, here: Posed, values: Array) -> tuple[Posed, Array]:
+    def send(self, here: RealAndHiddenState, values: Array) -> tuple[RealAndHiddenState, Array]:
         """Track the robot from ``here`` to platform coordinates (n,); return where it arrives, and the coordinates."""
         aim = Coordinates(self.setup.motion, self.coordinates.places, values)
         there, _ = track(here.real, self.setup.motion, aim)
@@ -140,7 +140,7 @@ class Mover(Value):
         found = followed[-1] if followed else here
         return found, values + aim.apart(found.real.pose(self.setup.motion.link))
 
-    def draw_to(self, here: Posed, X: Array) -> Posed:
+    def draw_to(self, here: RealAndHiddenState, X: Array) -> RealAndHiddenState:
         """Move the platform from ``here`` as near as possible to the pose X (4, 4), lengths in characteristic lengths,
         rotations in radians."""
         motion = self.setup.motion
@@ -153,19 +153,19 @@ class Mover(Value):
             motion.normal,
             rotation=X[:3, :3] if motion.body and motion.rotations.shape[1] else None,
         )
-        followed = self.follow_hidden(here, [approach(here.real, whole, APPROACH)])
+        followed = self.follow_hidden(here, [approach(here.real, whole, DRAG_APPROACH_STEPS_COUNT)])
         return followed[-1] if followed else here
 
-    def read(self, posed: Posed) -> Array:
+    def read(self, posed: RealAndHiddenState) -> Array:
         """Return the coordinates (n,) of the platform."""
         return self.coordinates.read(posed.real.pose(self.setup.motion.link))
 
-    def beside(self, at: ClosedConfiguration, q: Array) -> Posed | None:
+    def beside(self, at: ClosedConfiguration, q: Array) -> RealAndHiddenState | None:
         """Return the real robot with the hidden one at ``q``, None if pose or directions differ."""
         assert self.hidden is not None
-        return Posed(at, q) if np.linalg.norm(self._misses(at, q)) <= FOLLOWED else None
+        return RealAndHiddenState(at, q) if np.linalg.norm(self._misses(at, q)) <= HIDDEN_ROBOT_RESIDUAL_TOL else None
 
-    def with_hidden(self, at: ClosedConfiguration) -> Posed:
+    def with_hidden(self, at: ClosedConfiguration) -> RealAndHiddenState:
         """Return the real robot with the hidden one, tracked from its zero configuration; without it if that fails."""
         found = self.follow_hidden(self.home, [at])
         if not found:
@@ -175,22 +175,22 @@ class Mover(Value):
             halfway = goal.towards(self.home.real.pose(self.setup.motion.link), 0.5)
             way = [track(self.home.real, self.setup.motion, each)[0] for each in (halfway, goal)]
             found = self.follow_hidden(self.home, [*way, at])
-        return found[-1] if found and found[-1].real is at else Posed(at)
+        return found[-1] if found and found[-1].real is at else RealAndHiddenState(at)
 
     @cached_property
-    def ends(self) -> tuple[tuple[Posed, Posed], ...]:
+    def ends(self) -> tuple[tuple[RealAndHiddenState, RealAndHiddenState], ...]:
         """Return the lower and upper end of each slider, tracked within its span."""
         found = []
         for index, place in enumerate(self.coordinates.places):
             span = TURN if place >= 3 else WAY * self.home.real.model.length
             down, up = self.coordinates.ends(self.home.real, index, (span, span))
-            found.append((Posed(down), Posed(up)))
+            found.append((RealAndHiddenState(down), RealAndHiddenState(up)))
         return tuple(found)
 
-    def far(self, values: Array) -> bool:
+    def is_beyond_sliders(self, values: Array) -> bool:
         """Return True if coordinates (n,) are far beyond all sliders."""
         spans = np.where(np.array(self.coordinates.places) >= 3, TURN, WAY * self.home.real.model.length)
-        return bool(np.any(np.abs(values - self.coordinates.values) > BEYOND_SLIDERS * spans))
+        return bool(np.any(np.abs(values - self.coordinates.values) > SLIDER_DISTANCE_MAX * spans))
 
     def sliders(self) -> tuple[Slider, ...]:
         """Return the sliders, each over the range in which the robot and the hidden one can be tracked."""
@@ -199,7 +199,7 @@ class Mover(Value):
     def _slider(self, index: int) -> Slider:
         home, turns = self.home, self.coordinates.places[index] >= 3
         span = TURN if turns else WAY * home.real.model.length
-        ways = self.coordinates.along(home.real, index, (span, span), STEPS)
+        ways = self.coordinates.along(home.real, index, (span, span), SLIDER_CONFIGURATIONS_COUNT)
         start = next(i for i, (_, at) in enumerate(ways) if at is home.real)
         down = self.follow_hidden(home, [at for _, at in reversed(ways[:start])])
         up = self.follow_hidden(home, [at for _, at in ways[start + 1 :]])
@@ -213,22 +213,28 @@ class Mover(Value):
             len(down),
         )
 
-    def follow_hidden(self, start: Posed, way: Iterable[ClosedConfiguration]) -> list[Posed]:
+    def follow_hidden(self, start: RealAndHiddenState, way: Iterable[ClosedConfiguration]) -> list[RealAndHiddenState]:
         """Track the hidden robot along a path of the real one, as far as it can follow."""
-        found: list[Posed] = []
+        found: list[RealAndHiddenState] = []
         q = start.hidden
         for at in way:
             if self.hidden is not None and q is not None:
-                q, residual = solve(self.hidden, q, self._target(at), tolerance=SOLVED, iterations=FOLLOWING)
-                if not residual <= FOLLOWED:
+                q, residual = solve(
+                    self.hidden,
+                    q,
+                    self._target(at),
+                    tolerance=CLOSURE_SOLVER_TOL,
+                    iterations=VIEW_TRACKING_ITERATIONS_MAX,
+                )
+                if not residual <= HIDDEN_ROBOT_RESIDUAL_TOL:
                     break
-            found.append(Posed(at, q))
+            found.append(RealAndHiddenState(at, q))
         return found
 
     def _misses(self, at: ClosedConfiguration, q: Array) -> Array:
         """Return the residuals of the hidden robot at ``q``: loops, pose and directions."""
         assert self.hidden is not None
-        return system(self.hidden, q, self._target(at))[0]
+        return stack_task(self.hidden, q, self._target(at))[0]
 
     def _target(self, at: ClosedConfiguration) -> PoseAndValuesTask:
         """Return the pose and the directions that the hidden robot has; constant-direction legs are not in it."""
@@ -244,9 +250,9 @@ class Mover(Value):
         )
 
 
-def displacements(mechanism: Mechanism, pose: Any) -> Array:
+def compute_link_displacements(mechanism: Mechanism, pose: Any) -> Array:
     """Return the displacement of each link from the zero configuration, (links, 7); ``pose`` gives X_BL (4, 4)."""
-    return np.array([place(pose(name) @ inverse(link.pose)) for name, link in mechanism.links.items()])
+    return np.array([place(pose(name) @ invert_pose(link.pose)) for name, link in mechanism.links.items()])
 
 
 def place(X: Array) -> Array:
@@ -256,6 +262,6 @@ def place(X: Array) -> Array:
     return np.concatenate([X[:3, 3], Rotation.from_matrix(X[:3, :3]).as_quat(canonical=True)])
 
 
-def page_values(places: Array) -> list[list[float]]:
+def round_page_values(places: Array) -> list[list[float]]:
     """Round displacements (links, 7) for the page."""
-    return (np.round(places, PAGE_DIGITS) + 0.0).tolist()
+    return (np.round(places, PAGE_DIGITS_COUNT) + 0.0).tolist()

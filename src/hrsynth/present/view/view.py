@@ -23,18 +23,18 @@ from ...options import option
 from ...progress import report
 from ...records import FLAT, As, Number, Recorded, Shown, recorded
 from ...results import Result, Value
-from ..outputs import OUTPUTS, function
-from .meshes import meshes
-from .mode_outlines import ModeOutline, mode_outlines
-from .scale import scale, unit_of
-from .shapes import PAGE_DIGITS, RADIUS, Drawer, Shape
-from .sights import eyes, frames
-from .states import HIDDEN, REAL, Mover, Slider, ViewState, page_values, place
+from ..outputs import OUTPUTS, load_function
+from .meshes import collect_meshes
+from .mode_outlines import ModeOutline, list_mode_outlines
+from .scale import choose_error_unit, scale
+from .shapes import PAGE_DIGITS_COUNT, ROD_RADIUS_FRACTION, Drawer, Shape
+from .sights import compute_image_frames, list_cameras
+from .states import HIDDEN, REAL, Mover, Slider, ViewState, place, round_page_values
 
 ARROW = (0.35, 0.7)
 """Length of an arrow at least and at most (characteristic lengths); between these, a part ``SHARE`` of its link's."""
-SHARE = 0.55
-MARGIN = 4.0
+ARROW_LENGTH_FRACTION = 0.55
+RAIL_END_LENGTH_FRACTION = 4.0
 """Margin of a rail at each end (radii of rods)."""
 
 
@@ -61,7 +61,7 @@ class Machine(Value):
             "legs": list(self.legs),
             "platform": [places[link] for link in self.platform],
             "shapes": [shape.scene(places) for shape in self.shapes],
-            "frames": [{"link": places[link], "place": page_values(X[None])[0]} for link, X in self.frames],
+            "frames": [{"link": places[link], "place": round_page_values(X[None])[0]} for link, X in self.frames],
         }
 
 
@@ -76,7 +76,7 @@ class Arrow(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class View(Result, shown_as="view"):
-    """Result of :func:`view`. ``normal`` (3,) is that of the plane in which everything moves, None in space."""
+    """Result of :func:`format_view`. ``normal`` (3,) is that of the plane in which everything moves, None in space."""
 
     setup: Annotated[ObservedRobot, FLAT]
     derivation: Derivation | None
@@ -132,7 +132,7 @@ class View(Result, shown_as="view"):
         BadRequest
             If the port is not available.
         """
-        return function("studio.server:view_server")(self, port, open_)
+        return load_function("studio.server:view_server")(self, port, open_)
 
     dof = Shown(int, lambda self: self.setup.dof)
     shown = Shown(dict[str, str], lambda self: {machine.key: machine.words for machine in self.machines})
@@ -140,10 +140,10 @@ class View(Result, shown_as="view"):
 
     def scene(self) -> dict[str, Any]:
         """Return the data for the page."""
-        every = eyes(self.setup)
+        every = list_cameras(self.setup)
         return {
-            **stage(self.setup, self.machines, self.arrows),
-            "scale": scale(unit_of(self.setup)),
+            **describe_stage(self.setup, self.machines, self.arrows),
+            "scale": scale(choose_error_unit(self.setup)),
             "kept": True,
             "words": "; ".join(f"{machine.key} {machine.words}" for machine in self.machines),
             "legs": [{"name": arrow.leg, "watched": True} for arrow in self.arrows],
@@ -153,7 +153,7 @@ class View(Result, shown_as="view"):
             "notes": list(self.notes),
             "cameras": [
                 {"name": eye.name, "half": half.tolist()}
-                for eye, half in zip(every, frames(every, self.home.sights), strict=True)
+                for eye, half in zip(every, compute_image_frames(every, self.home.sights), strict=True)
             ],
         }
 
@@ -202,7 +202,7 @@ def view(
     <View: 3rrr_m1, 3 sliders, 1 other assembly modes>
     """
     notes: tuple[str, ...] = ()
-    if isinstance(robot, Mechanism) and robot.open_platform and not hidden:
+    if isinstance(robot, Mechanism) and robot.has_open_platform and not hidden:
         notes = (f"the sliders move link {robot.platform!r}: {robot.choice}",)
         robot = replace(robot, choice=PlatformChoice("assumption", "the first that could be"))
     setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed, blind=not hidden)
@@ -212,12 +212,12 @@ def view(
     report("sliders")
     sliders = mover.sliders()
     report("modes")
-    found, unlisted = mode_outlines(setup)
-    shapes, missing = meshes(setup)
+    found, unlisted = list_mode_outlines(setup)
+    shapes, missing = collect_meshes(setup)
     home = mover.with_error(mover.home)
     states = (home, *(state for slider in sliders for state in slider.states))
     machines = [
-        machine_of(
+        build_machine(
             REAL,
             setup,
             setup.mechanism,
@@ -228,7 +228,7 @@ def view(
     ]
     if derivation is not None and other is not None:
         machines.append(
-            machine_of(
+            build_machine(
                 HIDDEN,
                 setup,
                 other,
@@ -239,7 +239,7 @@ def view(
         )
     elif hidden:
         notes = (*notes, "every observed direction is constant: there is no hidden robot")
-    arrows = tuple(arrows_of(setup, setup.observed))
+    arrows = tuple(list_arrows(setup, setup.observed))
     return View(
         setup,
         derivation,
@@ -249,29 +249,31 @@ def view(
         sliders,
         arrows,
         found,
-        plane_normal(setup.motion),
+        find_plane_normal(setup.motion),
         (*notes, *unlisted, *missing),
     )
 
 
-def stage(setup: ObservedRobot, machines: Sequence[Machine], arrows: Iterable[Arrow]) -> dict[str, Any]:
+def describe_stage(setup: ObservedRobot, machines: Sequence[Machine], arrows: Iterable[Arrow]) -> dict[str, Any]:
     """Return the data of a scene for the page."""
-    mechanism, normal = setup.mechanism, plane_normal(setup.motion)
+    mechanism, normal = setup.mechanism, find_plane_normal(setup.motion)
     places = {name: i for i, name in enumerate(mechanism.links)}
     return {
         "name": setup.robot.name,
         "length": mechanism.length,
-        "radius": _radius(mechanism),
-        "freedoms": {key: np.round(rows, PAGE_DIGITS).tolist() for key, rows in freedoms(setup).items()},
-        "normal": None if normal is None else np.round(normal, PAGE_DIGITS).tolist(),
+        "radius": _choose_rod_radius(mechanism),
+        "freedoms": {
+            key: np.round(rows, PAGE_DIGITS_COUNT).tolist() for key, rows in list_platform_motions(setup).items()
+        },
+        "normal": None if normal is None else np.round(normal, PAGE_DIGITS_COUNT).tolist(),
         "machines": [machine.scene() for machine in machines],
         "arrows": [
-            {"leg": a.leg, "link": places[a.link], "ends": np.round(a.ends, PAGE_DIGITS).tolist()} for a in arrows
+            {"leg": a.leg, "link": places[a.link], "ends": np.round(a.ends, PAGE_DIGITS_COUNT).tolist()} for a in arrows
         ],
     }
 
 
-def freedoms(setup: ObservedRobot) -> dict[str, Array]:
+def list_platform_motions(setup: ObservedRobot) -> dict[str, Array]:
     """Return the directions (k, 3) of the platform's translations and rotations: together as many as its dof, those of
     its coordinates if there are more."""
     motion = setup.motion
@@ -287,14 +289,14 @@ def freedoms(setup: ObservedRobot) -> dict[str, Array]:
     return found
 
 
-def machine_of(
+def build_machine(
     key: str, setup: ObservedRobot, mechanism: Mechanism, words: str, places: Sequence[Array], meshes: Sequence[Shape]
 ) -> Machine:
     """Return a mechanism to be drawn, ``key`` real or hidden, with rails for displacements ``places`` (links, 7)."""
     real = setup.mechanism
     kept = tuple(shape for shape in meshes if shape.link in mechanism.links)
-    drawer = Drawer(mechanism, real, setup.decomposition.platform, _radius(real), kept)
-    shapes = drawer.shapes(_travels(drawer, places))
+    drawer = Drawer(mechanism, real, setup.decomposition.platform, _choose_rod_radius(real), kept)
+    shapes = drawer.shapes(_measure_travels(drawer, places))
     frames = tuple((link, place(mechanism.links[link].pose)) for link in (mechanism.base, mechanism.platform))
     legs = {link: leg.label for leg in setup.decomposition.legs for link in leg.links}
     return Machine(
@@ -308,11 +310,11 @@ def machine_of(
     )
 
 
-def _radius(mechanism: Mechanism) -> float:
-    return RADIUS * mechanism.length
+def _choose_rod_radius(mechanism: Mechanism) -> float:
+    return ROD_RADIUS_FRACTION * mechanism.length
 
 
-def _travels(drawer: Drawer, states: Sequence[Array]) -> dict[str, tuple[float, float]]:
+def _measure_travels(drawer: Drawer, states: Sequence[Array]) -> dict[str, tuple[float, float]]:
     """Return the travel of each prismatic joint on the base, with a margin for its carriage (m)."""
     from scipy.spatial.transform import Rotation
 
@@ -322,12 +324,12 @@ def _travels(drawer: Drawer, states: Sequence[Array]) -> dict[str, tuple[float, 
         places = np.array([state[links[joint.successor]] for state in states])
         moved = Rotation.from_quat(places[:, 3:]).apply(np.array(joint.point)) + places[:, :3] - joint.point
         ways = moved @ joint.axis
-        margin = MARGIN * drawer.radius
+        margin = RAIL_END_LENGTH_FRACTION * drawer.radius
         found[joint.name] = (float(ways.min()) - margin, float(ways.max()) + margin)
     return found
 
 
-def arrows_of(setup: ObservedRobot, observations: Iterable[Observation]) -> Iterator[Arrow]:
+def list_arrows(setup: ObservedRobot, observations: Iterable[Observation]) -> Iterator[Arrow]:
     """An arrow on the middle of each link with a direction, along what is or could be observed."""
     mechanism = setup.mechanism
     for seen in observations:
@@ -337,11 +339,11 @@ def arrows_of(setup: ObservedRobot, observations: Iterable[Observation]) -> Iter
         ways = np.array([joint.point for joint in mechanism.joints_of(seen.link)])
         along = ways @ direction
         middle = ways.mean(axis=0) + (0.5 * (along.min() + along.max()) - along.mean()) * direction
-        half = 0.5 * float(np.clip(SHARE * np.ptp(along), *(np.array(ARROW) * mechanism.length)))
+        half = 0.5 * float(np.clip(ARROW_LENGTH_FRACTION * np.ptp(along), *(np.array(ARROW) * mechanism.length)))
         yield Arrow(seen.leg, seen.link, np.array([middle - half * direction, middle + half * direction]))
 
 
-def plane_normal(motion: PlatformMotion) -> Array | None:
+def find_plane_normal(motion: PlatformMotion) -> Array | None:
     """The normal of the plane in which the platform moves, None where it leaves every plane."""
     if motion.translations.shape[1] != 2:
         return None

@@ -12,7 +12,7 @@ from ..rule import Rule, Stage
 
 
 @cache
-def rules(*stages: Stage) -> tuple[Rule[Any, Any], ...]:
+def list_rules(*stages: Stage) -> tuple[Rule[Any, Any], ...]:
     """Return the rules of some stages (default: all), stage by stage, in each by descending names of their files."""
     found = list(_find_rules())
     return tuple(rule for stage in stages or Stage for rule in found if rule.stage is stage)

@@ -12,7 +12,7 @@ from dataclasses import replace
 from ...geometry.vectors import Array
 from ...mechanism import Joint, JointType
 from ..evidence import Evidence
-from ..rule import AXES, LOOPS, Match, Rule, Stage, each_chain
+from ..rule import AXES, LOOPS, Match, Rule, Stage, list_chain_places
 from ..state import State, VirtualChain
 
 Carried = tuple[VirtualChain, str | Array]
@@ -26,9 +26,9 @@ def find(state: State, evidence: Evidence, chain: VirtualChain) -> Iterator[Matc
     if proximal is None or chain.before is None:
         return
     locus = proximal.anchor_locus
-    if proximal.translates and chain.before != reference:
+    if proximal.is_translating and chain.before != reference:
         yield Match((chain, chain.before), "the link before the observed one only translates: it carries the actuator")
-    elif proximal.translates or locus.dimension == 0:
+    elif proximal.is_translating or locus.dimension == 0:
         yield Match((chain, reference), "the proximal centre is fixed")
     elif locus.dimension < 3:
         yield Match(
@@ -40,10 +40,10 @@ def find(state: State, evidence: Evidence, chain: VirtualChain) -> Iterator[Matc
 def apply(state: State, found: Carried) -> State:
     """T is the carrier, or stands on one P or two."""
     chain, carrier = found
-    return _on(state, chain, carrier) if isinstance(carrier, str) else _sliding(state, chain, carrier)
+    return _place_on_locus(state, chain, carrier) if isinstance(carrier, str) else _add_sliders(state, chain, carrier)
 
 
-def _on(state: State, chain: VirtualChain, carrier: str) -> State:
+def _place_on_locus(state: State, chain: VirtualChain, carrier: str) -> State:
     mechanism = state.mechanism
     actuator = mechanism.joints[chain.actuator].relinked(chain.carrier, carrier)
     changed = mechanism.changed(remove_links=[chain.carrier, *chain.slider_links], joints=[actuator])
@@ -52,7 +52,7 @@ def _on(state: State, chain: VirtualChain, carrier: str) -> State:
     return state.with_chain(chain, replace(chain, carrier=carrier, sliders=(), slider_links=()), changed)
 
 
-def _sliding(state: State, chain: VirtualChain, axes: Array) -> State:
+def _add_sliders(state: State, chain: VirtualChain, axes: Array) -> State:
     mechanism = state.mechanism
     links = chain.slider_links[: len(axes) - 1]
     path = [mechanism.reference, *links, chain.carrier]
@@ -73,7 +73,7 @@ RULE = Rule(
     Stage.ANCHOR,
     find,
     apply,
-    each_chain,
+    list_chain_places,
     otherwise="the proximal centre moves in space, or the part before the observed link is not a separate chain",
     keeps=(LOOPS, AXES),
 )

@@ -11,8 +11,8 @@ from dataclasses import replace
 
 from ...geometry.vectors import Array
 from ...mechanism import JointType
-from ..evidence import Evidence, locus
-from ..rule import AXES, LOOPS, Match, Rule, Stage, each_chain
+from ..evidence import Evidence, fit_linear_locus
+from ..rule import AXES, LOOPS, Match, Rule, Stage, list_chain_places
 from ..state import State, VirtualChain
 
 Turning = tuple[VirtualChain, Array | None]
@@ -24,7 +24,7 @@ def find(state: State, evidence: Evidence, chain: VirtualChain) -> Iterator[Matc
     observations = evidence.samples.observation_model.observations
     own = [i for i, o in enumerate(observations) if o.leg == chain.leg]
     index = next((i for i in own if observations[i].link == chain.link), own[0])
-    found = locus(evidence.directions(index), 1.0)
+    found = fit_linear_locus(evidence.directions(index), 1.0)
     if found.dimension == 0:
         yield Match((chain, None), "the direction is constant")
     elif found.dimension == 2:
@@ -50,7 +50,7 @@ RULE = Rule(
     Stage.DIRECTION,
     find,
     apply,
-    each_chain,
+    list_chain_places,
     otherwise="the direction moves with two dof",
     keeps=(LOOPS, AXES),
 )

@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...geometry.vectors import Array, perpendicular, unit
+from ...geometry.vectors import Array, find_perpendicular, normalise_vector
 from ...mechanism import Joint, JointType
 from ..evidence import Evidence
-from ..rule import AXES, LOOPS, Match, Refusal, Rule, Stage, whole_leg
-from ..state import State, VirtualChain, ball_to_universal
+from ..rule import AXES, LOOPS, Match, Refusal, Rule, Stage, list_leg_place
+from ..state import State, VirtualChain, convert_ball_to_universal
 
 OUTER_AXES = ((0.0, 0.0, 0.0), (0, 0, 1), (1, 1, 0), (1, -1, 0), (0, 1, 1), (0, 1, -1), (1, 2, 3), (3, -1, 2))
 """Outer axes that are tried, in the leg's own frame (u, side, u × side); zero: the axis as it is."""
@@ -41,14 +41,18 @@ class LegEnds:
         if not (self.chain.spins and trial.any()):
             return self
         u = self.chain.direction
-        side = perpendicular(u, self.beside[0].point - self.chain.anchor if self.beside else None)
-        outer = unit(np.column_stack([u, side, np.cross(u, side)]) @ trial)
-        return replace(self, axes=(outer, unit(np.cross(outer, u))), turned=True)
+        side = find_perpendicular(u, self.beside[0].point - self.chain.anchor if self.beside else None)
+        outer = normalise_vector(np.column_stack([u, side, np.cross(u, side)]) @ trial)
+        return replace(self, axes=(outer, normalise_vector(np.cross(outer, u))), turned=True)
 
 
 def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[list[LegEnds]] | Refusal]:
     """Yield all observed legs at once: a match for each direction of the outer axis."""
-    found = [ends for chain in state.chains if chain.taken and (ends := _ends(state, evidence, chain)) is not None]
+    found = [
+        ends
+        for chain in state.chains
+        if chain.taken and (ends := _classify_leg_ends(state, evidence, chain)) is not None
+    ]
     if not found:
         yield Refusal("no observed leg ends in an S whose rod the actuator moves")
     elif any(each.chain.spins for each in found):
@@ -64,7 +68,7 @@ def _match(found: list[LegEnds]) -> Match[list[LegEnds]]:
     return Match(found, f"the last S becomes U, inner axes parallel, outer axes parallel to {words}")
 
 
-def _ends(state: State, evidence: Evidence, chain: VirtualChain) -> LegEnds | None:
+def _classify_leg_ends(state: State, evidence: Evidence, chain: VirtualChain) -> LegEnds | None:
     """Return the ends of a leg; None if its actuator is no U or its ends are no S."""
     mechanism, leg = state.mechanism, state.real.leg(chain.leg)
     actuator = mechanism.joints[chain.actuator]
@@ -89,17 +93,17 @@ def apply(state: State, found: list[LegEnds]) -> State:
     for each in found:
         mechanism, (outer, inner) = state.mechanism, each.axes
         joints = [
-            ball_to_universal(end, end.other(each.attach), (inner, outer))
+            convert_ball_to_universal(end, end.other(each.attach), (inner, outer))
             for end in each.ends
             if mechanism.joints[end.name].type is JointType.SPHERICAL
         ]
         if each.turned:
             joints += [
-                ball_to_universal(joint, each.chain.carrier, each.axes)
+                convert_ball_to_universal(joint, each.chain.carrier, each.axes)
                 for joint in (mechanism.joints[each.chain.actuator], *each.beside)
             ]
         state = state.with_chain(each.chain, each.chain, mechanism.changed(joints=joints))
     return state
 
 
-RULE = Rule("end change", "MMT 3.2, 4.2.2", Stage.ENDS, find, apply, whole_leg, keeps=(LOOPS, AXES))
+RULE = Rule("end change", "MMT 3.2, 4.2.2", Stage.ENDS, find, apply, list_leg_place, keeps=(LOOPS, AXES))

@@ -13,12 +13,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from ...geometry.lines import parallel
+from ...geometry.lines import is_parallel
 from ...geometry.vectors import Array
 from ...mechanism import Joint, JointType
 from ..evidence import Evidence, ProximalChain
-from ..rule import AXES, LOOPS, Match, Refusal, Rule, Stage, each_chain
-from ..state import State, VirtualChain, towards
+from ..rule import AXES, LOOPS, Match, Refusal, Rule, Stage, list_chain_places
+from ..state import State, VirtualChain, orient_joint
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +34,10 @@ class Substitution:
 def find(state: State, evidence: Evidence, chain: VirtualChain) -> Iterator[Match[Substitution | None] | Refusal]:
     """A joint K that is not on the reference link itself."""
     if chain.before != evidence.reference:
-        yield from substitution(state, evidence, chain)
+        yield from find_substitution(state, evidence, chain)
 
 
-def substitution(
+def find_substitution(
     state: State, evidence: Evidence, chain: VirtualChain
 ) -> Iterator[Match[Substitution | None] | Refusal]:
     """Yield the joint K of a chain that has substituted none; None if another chain of the leg has substituted it."""
@@ -53,8 +53,8 @@ def substitution(
     if proximal is None or chain.k_joint is None or chain.before is None:
         yield Refusal("no single R, U or S joint stands before the observed link")
         return
-    K = towards(state.mechanism.joints[chain.k_joint], chain.before)
-    if _steady(K, state.mechanism.joints[chain.actuator], proximal):
+    K = orient_joint(state.mechanism.joints[chain.k_joint], chain.before)
+    if _has_constant_first_axis(K, state.mechanism.joints[chain.actuator], proximal):
         yield Match(Substitution(chain, K, proximal.turning_axis), f"the actuator takes the axes of {K.name!r}")
         return
     found = Substitution(chain, None, proximal.turning_axis)
@@ -69,12 +69,12 @@ def substitution(
         )
 
 
-def _steady(K: Joint, actuator: Joint, proximal: ProximalChain) -> bool:
+def _has_constant_first_axis(K: Joint, actuator: Joint, proximal: ProximalChain) -> bool:
     """Condition (ii): K has as many axes as the direction has ways to move, the first one steady."""
     return (
         K.type is actuator.type
-        and proximal.keeps(K.axis)
-        and (K.type is not JointType.REVOLUTE or parallel(K.axis, actuator.axis))
+        and proximal.has_constant_direction(K.axis)
+        and (K.type is not JointType.REVOLUTE or is_parallel(K.axis, actuator.axis))
     )
 
 
@@ -112,4 +112,6 @@ def apply(state: State, found: Substitution | None) -> State:
     )
 
 
-RULE = Rule("joint substitution", "MMT 3.2, Fig. 2(b)", Stage.JOINT, find, apply, each_chain, keeps=(LOOPS, AXES))
+RULE = Rule(
+    "joint substitution", "MMT 3.2, Fig. 2(b)", Stage.JOINT, find, apply, list_chain_places, keeps=(LOOPS, AXES)
+)

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from ..evidence import Evidence
-from ..rule import Match, Refusal, Rule, Stage, whole_leg
+from ..rule import Match, Refusal, Rule, Stage, list_leg_place
 from ..state import State
 
 
@@ -55,6 +55,6 @@ RULE = Rule(
     Stage.LEG,
     find,
     apply,
-    whole_leg,
+    list_leg_place,
     keeps=("the wrenches of removed legs are among those of the others",),
 )

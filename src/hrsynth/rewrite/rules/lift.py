@@ -12,13 +12,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from ...geometry.vectors import Array, pose
+from ...geometry.vectors import Array, build_pose
 from ...mechanism import Joint, JointType, Link, Motor, Observation
 from ...mechanism.cameras import CameraObservation, VirtualJoint
 from ...mechanism.observations.direction import SeenAxis
 from ...mechanism.observations.encoder import Encoder
 from ..evidence import Evidence, ProximalChain
-from ..rule import AXES, Match, Rule, Stage, whole_leg
+from ..rule import AXES, Match, Rule, Stage, list_leg_place
 from ..state import ObservationChain, State, VirtualChain
 
 SEGMENT = ("slide_x", "slide_y", "slide_z", "virtual", "roll"), ("guide_x", "guide_y", "carrier", "bearing")
@@ -48,10 +48,10 @@ def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[list[Lift
         tag = f"{leg}_{index}" if found else leg
         if isinstance(observation, Encoder):
             found.append(observation)
-        elif observation.by_segment:
-            found.append(_segment(state, evidence, observation, index, tag))
+        elif observation.is_segment_direction:
+            found.append(_lift_segment(state, evidence, observation, index, tag))
         else:
-            found.append(_sensor(state, evidence, observation, index, tag))
+            found.append(_lift_sensor(state, evidence, observation, index, tag))
     words = dict.fromkeys(
         "an encoder actuates its joint"
         if isinstance(each, Encoder)
@@ -63,7 +63,7 @@ def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[list[Lift
     yield Match(found, "; ".join(words))
 
 
-def _segment(state: State, evidence: Evidence, seen: Observation, index: int, tag: str) -> LiftedChain:
+def _lift_segment(state: State, evidence: Evidence, seen: Observation, index: int, tag: str) -> LiftedChain:
     """Return the chain of a direction, with the proximal centre A where the leg's joint K is."""
     assert isinstance(seen, SeenAxis)
     links, reference = state.mechanism.links, state.mechanism.reference
@@ -74,7 +74,7 @@ def _segment(state: State, evidence: Evidence, seen: Observation, index: int, ta
     return LiftedChain(seen.leg, tag, link, reference, seen.chain(replace(at, B=anchor)), True, proximal)
 
 
-def _sensor(state: State, evidence: Evidence, seen: Observation, index: int, tag: str) -> LiftedChain:
+def _lift_sensor(state: State, evidence: Evidence, seen: Observation, index: int, tag: str) -> LiftedChain:
     """Return the chain of any other observation."""
     assert isinstance(seen, SeenAxis | CameraObservation)
     links, reference = state.mechanism.links, seen.seen_from or state.mechanism.reference
@@ -106,10 +106,10 @@ def _lift(state: State, lifting: LiftedChain) -> State:
         Joint(name, JointType(joint.letter), a, b, joint.at, joint.axes, Motor(name) if joint.actuated else None)
         for name, joint, a, b in zip(joint_names, lifting.joints, path, path[1:], strict=False)
     ]
-    links = [Link(name, pose(joint.at)) for name, joint in zip(link_names, lifting.joints, strict=False)]
+    links = [Link(name, build_pose(joint.at)) for name, joint in zip(link_names, lifting.joints, strict=False)]
     changed = mechanism.changed(links=links, joints=joints)
     if not lifting.segment:
-        driven = tuple(joint.name for joint in joints if joint.actuated)
+        driven = tuple(joint.name for joint in joints if joint.is_actuated)
         sensor = ObservationChain(
             lifting.leg, lifting.link, lifting.reference, tuple(link_names), tuple(joint_names), driven
         )
@@ -142,11 +142,11 @@ def _lift(state: State, lifting: LiftedChain) -> State:
 def _encode(state: State, seen: Encoder) -> State:
     """The real joint with a motor; of two coordinates of one joint the second changes nothing."""
     joint = state.mechanism.joints[seen.joint]
-    if joint.actuated:
+    if joint.is_actuated:
         return state
     changed = state.mechanism.changed(joints=[replace(joint, motor=Motor(joint.name))])
     sensor = ObservationChain(seen.leg, seen.link, str(seen.seen_from), (), (), (joint.name,))
     return replace(state, mechanism=changed, sensors=(*state.sensors, sensor))
 
 
-RULE = Rule("lift", "MMT 3.2, Fig. 2(b)", Stage.LIFT, find, apply, whole_leg, always=True, keeps=(AXES,))
+RULE = Rule("lift", "MMT 3.2, Fig. 2(b)", Stage.LIFT, find, apply, list_leg_place, always=True, keeps=(AXES,))

@@ -10,13 +10,13 @@ from dataclasses import replace
 
 from ...mechanism import Joint
 from ..evidence import Evidence
-from ..rule import Match, Rule, Stage, whole_leg
+from ..rule import Match, Rule, Stage, list_leg_place
 from ..state import State
 
 
 def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[list[Joint]]]:
     """Yield all motors of all legs at once."""
-    driven = [joint for joint in state.mechanism.joints.values() if joint.actuated]
+    driven = [joint for joint in state.mechanism.joints.values() if joint.is_actuated]
     count = sum(joint.type.freedoms for joint in driven)
     yield Match(
         driven,
@@ -33,4 +33,4 @@ def apply(state: State, driven: list[Joint]) -> State:
     return replace(state, mechanism=state.mechanism.changed(joints=[replace(joint, motor=None) for joint in driven]))
 
 
-RULE = Rule("motors off", "MMT 3.1, 4.2", Stage.MOTORS, find, apply, whole_leg, always=True)
+RULE = Rule("motors off", "MMT 3.1, 4.2", Stage.MOTORS, find, apply, list_leg_place, always=True)

@@ -12,11 +12,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...geometry.lines import foot
-from ...geometry.vectors import pose
+from ...geometry.lines import project_to_line
+from ...geometry.vectors import build_pose
 from ...mechanism import Joint, JointType, Link
 from ..evidence import Evidence
-from ..rule import Match, Refusal, Rule, Stage, each_chain
+from ..rule import Match, Refusal, Rule, Stage, list_chain_places
 from ..state import State, VirtualChain
 
 Circling = tuple[VirtualChain, Joint]
@@ -38,12 +38,12 @@ def apply(state: State, found: Circling) -> State:
     """Cranks from the reference link to T in the place of the sliders: one beside the real one, or two."""
     chain, base = found
     mechanism = state.mechanism
-    centre = foot(chain.anchor, base.point, base.axis)
+    centre = project_to_line(chain.anchor, base.point, base.axis)
     side = np.cross(base.axis, chain.anchor - centre)
     offsets = {chain.leg: side} if chain.taken else {f"{chain.leg}_0": np.zeros(3), chain.leg: side}
     links, joints = [], []
     for tag, offset in offsets.items():
-        crank = Link(mechanism.fresh(f"crank_{tag}"), pose(centre + offset))
+        crank = Link(mechanism.fresh(f"crank_{tag}"), build_pose(centre + offset))
         links.append(crank)
         joints.append(
             Joint(
@@ -73,4 +73,4 @@ def apply(state: State, found: Circling) -> State:
     )
 
 
-RULE = Rule("pi form", "MMT Fig. 4(c)", Stage.FORM, find, apply, each_chain, keeps=("no Π is flat",))
+RULE = Rule("pi form", "MMT Fig. 4(c)", Stage.FORM, find, apply, list_chain_places, keeps=("no Π is flat",))

@@ -8,15 +8,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..evidence import Evidence
-from ..rule import AXES, Match, Refusal, Rule, Stage, each_chain
+from ..rule import AXES, Match, Refusal, Rule, Stage, list_chain_places
 from ..state import State, VirtualChain
-from .joint_substitution import Substitution, apply, substitution
+from .joint_substitution import Substitution, apply, find_substitution
 
 
 def find(state: State, evidence: Evidence, chain: VirtualChain) -> Iterator[Match[Substitution | None] | Refusal]:
     """A joint K on the reference link."""
     if chain.before == evidence.reference:
-        yield from substitution(state, evidence, chain)
+        yield from find_substitution(state, evidence, chain)
 
 
-RULE = Rule("prismatic merge", "MMT 4.2.1", Stage.JOINT, find, apply, each_chain, keeps=(AXES,))
+RULE = Rule("prismatic merge", "MMT 4.2.1", Stage.JOINT, find, apply, list_chain_places, keeps=(AXES,))

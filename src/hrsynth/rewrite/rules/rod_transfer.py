@@ -9,8 +9,8 @@ from collections.abc import Iterator
 
 from ...mechanism import Joint, JointType
 from ..evidence import Evidence
-from ..rule import AXES, LOOPS, Match, Rule, Stage, each_chain
-from ..state import State, VirtualChain, ball_to_universal
+from ..rule import AXES, LOOPS, Match, Rule, Stage, list_chain_places
+from ..state import State, VirtualChain, convert_ball_to_universal
 
 Beside = tuple[VirtualChain, list[Joint]]
 """A chain, and the joints on the link before K of the rods beside its link."""
@@ -27,7 +27,7 @@ def find(state: State, evidence: Evidence, chain: VirtualChain) -> Iterator[Matc
             if joint.other(rod) == chain.before:
                 rods.setdefault(rod, joint)
     if rods:
-        kept = all(proximal.keeps(joint.point - chain.anchor) for joint in rods.values())
+        kept = all(proximal.has_constant_direction(joint.point - chain.anchor) for joint in rods.values())
         yield Match(
             (chain, list(rods.values())),
             f"{', '.join(map(repr, rods))} stays parallel to the observed rod",
@@ -41,7 +41,7 @@ def apply(state: State, found: Beside) -> State:
     mechanism, before = state.mechanism, str(chain.before)
     actuator = mechanism.joints[chain.actuator]
     moved = [
-        ball_to_universal(joint, before, (actuator.axes[0], actuator.axes[1]))
+        convert_ball_to_universal(joint, before, (actuator.axes[0], actuator.axes[1]))
         if joint.type is JointType.SPHERICAL and actuator.type is JointType.UNIVERSAL
         else joint
         for joint in joints
@@ -51,4 +51,4 @@ def apply(state: State, found: Beside) -> State:
     return state.with_chain(chain, chain, mechanism.changed(joints=moved))
 
 
-RULE = Rule("rod transfer", "MMT Fig. 13", Stage.BESIDE, find, apply, each_chain, keeps=(LOOPS, AXES))
+RULE = Rule("rod transfer", "MMT Fig. 13", Stage.BESIDE, find, apply, list_chain_places, keeps=(LOOPS, AXES))

@@ -16,18 +16,25 @@ from numpy.typing import NDArray
 
 from ...analysis.observed import ObservedRobot
 from ...batch.enclosures import BoxFormula, trace_formula
-from ...budgets import RADIUS_BOXES, RAYS
-from ...geometry.affine import AffineForms, affine, stack
-from ...geometry.so3 import angle_of
+from ...budgets import ATTRACTION_RADIUS_BOXES_MAX, GOAL_RAYS_COUNT
+from ...geometry.affine import AffineForms, make_affine, stack
+from ...geometry.so3 import compute_rotation_angle
 from ...geometry.vectors import Array, transform
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...records import As, recorded
 from ...results import Value
-from ...tolerances import AFFINE_ROUNDING, CERTIFIED_LEVEL, FOLLOWED, RADIUS_SHARES, RANK_CUTOFF, SAME_POINT
+from ...tolerances import (
+    AFFINE_ROUNDING,
+    HIDDEN_ROBOT_RESIDUAL_TOL,
+    POINT_DISTANCE_TOL,
+    PROVED_LEVEL_FRACTION,
+    RADIUS_SHARES,
+    RANK_CUTOFF_FRACTION,
+)
 from .cones import ConeProver, ProvedCones, prove_cones, proved_all_over
 from .inward_flow import inward_radius
-from .pose_error import NotEnclosed, PoseError
+from .pose_error import EnclosureFailure, PoseError
 
 CERTIFIED, UNDECIDED = "certified", "undecided"
 
@@ -90,28 +97,28 @@ class CertifiedRadius(Value):
         at = f", {self.measured}" if self.measured else ""
         return f"within {1e3 * length:.3g} mm{turn} of the goal in its working mode{at}"
 
-    def holds(self, X: Array) -> bool:
+    def has_start(self, X: Array) -> bool:
         """Return True if a platform pose X (4, 4) is one of those starts."""
         here = self.goal.pose(self.motion.link)
         shift = transform(X, self.motion.point) - transform(here, self.motion.point)
         return bool(
             np.linalg.norm(shift) <= self.length
-            and (self.angle is None or angle_of(X[:3, :3] @ here[:3, :3].T) <= self.angle)
+            and (self.angle is None or compute_rotation_angle(X[:3, :3] @ here[:3, :3].T) <= self.angle)
         )
 
 
 def certified_radius(setup: ObservedRobot, goal: ClosedConfiguration) -> CertifiedRadius:
     """Return the largest attraction radius proved with the budget of boxes, for observed directions of segments."""
     try:
-        if not all(each.by_segment for each in setup.observed):
-            raise NotEnclosed("only directions of segments are supported")
+        if not all(each.is_segment_direction for each in setup.observed):
+            raise EnclosureFailure("only directions of segments are supported")
         error = PoseError.of(setup, goal)
         if error.fitted:
-            raise NotEnclosed(f"forms are fitted to samples: {', '.join(error.fitted)}")
+            raise EnclosureFailure(f"forms are fitted to samples: {', '.join(error.fitted)}")
         if error.limits:
-            raise NotEnclosed(f"a run may stop at a joint limit: {', '.join(error.limits)}")
+            raise EnclosureFailure(f"a run may stop at a joint limit: {', '.join(error.limits)}")
         proved = _proved_cones(error)
-    except NotEnclosed as why:
+    except EnclosureFailure as why:
         return CertifiedRadius(goal, setup.motion, 0.0, None, 0.0, 0.0, 0, str(why))
     reach, boxes = _reach(proved)
     angle = reach if error.turns.shape[1] else None
@@ -119,7 +126,7 @@ def certified_radius(setup: ObservedRobot, goal: ClosedConfiguration) -> Certifi
     least = proved.rise / (error.size * float(np.linalg.norm(proved.prover.W, 2)) ** 2)
     reason = "forms of the legs and the error enclosed in cones about the goal"
     ball, more = inward_radius(error)
-    aside = bool(np.linalg.norm(error.motion.point - setup.motion.point) > SAME_POINT * error.length)
+    aside = bool(np.linalg.norm(error.motion.point - setup.motion.point) > POINT_DISTANCE_TOL * error.length)
     return CertifiedRadius(
         goal,
         error.motion,
@@ -144,28 +151,28 @@ def _product(radius: float) -> float:
 
 
 def _proved_cones(error: PoseError) -> ProvedCones:
-    """Prove cones nearly up to where E stops rising on some ray; raises ``NotEnclosed``."""
+    """Prove cones nearly up to where E stops rising on some ray; raises ``EnclosureFailure``."""
     n = error.size
     _, rates = error.numbers(np.zeros((1, n)), np.eye(n))
     J = rates[0]
     values, V = np.linalg.eigh(J.T @ J)
-    if values[0] <= RANK_CUTOFF * values[-1]:
-        raise NotEnclosed("the directions do not determine all platform twists at the goal")
+    if values[0] <= RANK_CUTOFF_FRACTION * values[-1]:
+        raise EnclosureFailure("the directions do not determine all platform twists at the goal")
     W = V / np.sqrt(values)
     seen = _highest(error, W)
     prover = ConeProver.of(error, W * np.sqrt(2 * seen))
-    proved = prove_cones(prover, CERTIFIED_LEVEL * seen)
+    proved = prove_cones(prover, PROVED_LEVEL_FRACTION * seen)
     if not proved.level > 0:
-        raise NotEnclosed("no ball about the goal is small enough for the enclosures")
+        raise EnclosureFailure("no ball about the goal is small enough for the enclosures")
     return proved
 
 
 def _highest(error: PoseError, W: Array) -> float:
     """The least E at which a ray of many stops rising, or leaves the legs' reach: seen, not proved."""
     n = error.size
-    w = np.random.default_rng(0).normal(size=(RAYS, n))
+    w = np.random.default_rng(0).normal(size=(GOAL_RAYS_COUNT, n))
     w /= np.linalg.norm(w, axis=1)[:, None]
-    rising, before, lowest = np.ones(RAYS, dtype=bool), np.zeros(RAYS), np.inf
+    rising, before, lowest = np.ones(GOAL_RAYS_COUNT, dtype=bool), np.zeros(GOAL_RAYS_COUNT), np.inf
     for t in np.geomspace(1e-3, 3.0, 150):
         if not rising.any():
             break
@@ -182,8 +189,8 @@ def _reach(proved: ProvedCones) -> tuple[float, int]:
     that rays show."""
     error, W, c = proved.prover.error, proved.prover.W, proved.level
     # rays evenly about the goal, and towards where E rises fast
-    w = np.random.default_rng(0).normal(size=(2 * RAYS, error.size))
-    x = np.concatenate([w[:RAYS], w[RAYS:] @ np.linalg.inv(W)])
+    w = np.random.default_rng(0).normal(size=(2 * GOAL_RAYS_COUNT, error.size))
+    x = np.concatenate([w[:GOAL_RAYS_COUNT], w[GOAL_RAYS_COUNT:] @ np.linalg.inv(W)])
     x *= np.max(np.linalg.norm(W, axis=0)) / np.linalg.norm(x, axis=1)[:, None]
     low, high = np.zeros(len(x)), np.full(len(x), 2.0)
     for _ in range(40):
@@ -215,14 +222,16 @@ def _highest_on(errors: BoxFormula, Q: Array, middle: Array, half: Array) -> Aff
     """E over boxes (c, n) of coordinates x: with e = Q x + a it is ½ (xᵀ Qᵀ Q x + 2 Q x · a + |a|²)."""
     n, H = middle.shape[1], Q.T @ Q
     off = half[:, :, None] * np.eye(n)
-    e = stack(errors.at([affine(middle[:, i], off[:, i], np.zeros(len(middle))) for i in range(n)]))
+    e = stack(errors.at([make_affine(middle[:, i], off[:, i], np.zeros(len(middle))) for i in range(n)]))
     extent = np.abs(middle) + half
-    Qx = affine(middle @ Q.T, np.einsum("cks,rk->crs", off, Q), AFFINE_ROUNDING * extent @ np.abs(Q).T)
+    Qx = make_affine(middle @ Q.T, np.einsum("cks,rk->crs", off, Q), AFFINE_ROUNDING * extent @ np.abs(Q).T)
     a = e - Qx
     # xᵀ H x at the middle m: mᵀ H m + 2 (H m) · δ + δᵀ H δ
     Hm = middle @ H
-    bent = np.einsum("ci,ij,cj->c", half, np.abs(H), half) + FOLLOWED * np.sum(extent @ np.abs(H) * extent, axis=1)
-    square = affine(np.sum(Hm * middle, axis=1), 2 * Hm * half, bent)
+    bent = np.einsum("ci,ij,cj->c", half, np.abs(H), half) + HIDDEN_ROBOT_RESIDUAL_TOL * np.sum(
+        extent @ np.abs(H) * extent, axis=1
+    )
+    square = make_affine(np.sum(Hm * middle, axis=1), 2 * Hm * half, bent)
     return 0.5 * (square + (2.0 * (Qx * a) + a * a).sum())
 
 
@@ -230,7 +239,7 @@ def _below(error: PoseError, errors: BoxFormula, Q: Array, radius: float, c: flo
     """Return True if E < c is enclosed at all poses within a radius, by boxes that are cut where it is not; with their
     number."""
     k, n = error.shifts.shape[1], error.size
-    whole = np.where(np.arange(n) < k, radius, np.tan(min(radius, 3.0) / 2)) * (1 + FOLLOWED)
+    whole = np.where(np.arange(n) < k, radius, np.tan(min(radius, 3.0) / 2)) * (1 + HIDDEN_ROBOT_RESIDUAL_TOL)
 
     def inside(middle: Array, half: Array) -> NDArray[np.bool_]:
         return np.asarray(_gauge(error, np.maximum(np.abs(middle) - half, 0.0)) <= radius)
@@ -238,4 +247,4 @@ def _below(error: PoseError, errors: BoxFormula, Q: Array, radius: float, c: flo
     def judge(middle: Array, half: Array) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
         return _highest_on(errors, Q, middle, half).high < c, np.argmax(half / whole, axis=1)
 
-    return proved_all_over(whole, inside, judge, RADIUS_BOXES)
+    return proved_all_over(whole, inside, judge, ATTRACTION_RADIUS_BOXES_MAX)

@@ -17,12 +17,12 @@ from ...analysis.accuracy.error_map import Mapper
 from ...analysis.accuracy.measurement_bounds import MeasurementBounds
 from ...analysis.analysis_declaration import analysis
 from ...analysis.observed import CameraLike, Jobs, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike
-from ...analysis.pose_requests import configurations_at
-from ...batch.grids import poses_over
+from ...analysis.pose_requests import solve_configurations
+from ...batch.grids import list_grid_poses
 from ...batch.pose_continuation import sweep
 from ...budgets import (
     FLOW_CHECKED,
-    FLOW_EXAMPLES,
+    FLOW_EXAMPLES_MAX,
     FLOW_FEW,
     FLOW_FOLLOWED,
     FLOW_NAMED,
@@ -30,20 +30,20 @@ from ...budgets import (
     FLOW_SINGLE,
     FLOW_STARTS,
     FLOW_STARTS_ONE_BY_ONE,
-    RUN_AWAY,
+    RUN_ESCAPE_DISTANCE_MAX,
 )
 from ...errors import BadRequest, HrsynthError, NoReachablePose
 from ...geometry.so3 import turn_about
-from ...geometry.vectors import Array, pose_difference
+from ...geometry.vectors import Array, compare_poses
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
-from ...mechanism.pose import Grid, Pose, PoseLike, as_pose, asked_pose
+from ...mechanism.pose import Grid, Pose, PoseLike, convert_to_pose, parse_pose
 from ...options import option
 from ...processes import run_shared
 from ...progress import report
 from ...records import FLAT, As, Number, Recorded, Shown, Table, recorded
 from ...results import Result, Value
-from ...tolerances import RUNS_ALIKE, SEEN_ABOVE
+from ...tolerances import RUN_END_DIFFERENCE_TOL, VISIBLE_SINE_MIN
 from ..law import Depth, measure_all
 from ..outcome import ENDINGS, GOAL, SIGHT, TIME, UNDECIDED, OutcomeClassifier, RunOutcome
 from ..run import AWAY, EFFORT, LOST, POISED, REST, SERVED_AT
@@ -146,8 +146,8 @@ class Basins(Result, shown_as="basins"):
             ),
             self.grid.fixed,
         )
-        X, possible = poses_over(motion, near, self.setup.robot.name, near.places())
-        inside = np.array([met and found.holds(each) for met, each in zip(possible, X, strict=True)])
+        X, possible = list_grid_poses(motion, near, self.setup.robot.name, near.places())
+        inside = np.array([met and found.has_start(each) for met, each in zip(possible, X, strict=True)])
         return (near, inside.reshape(near.shape)) if inside.any() else None
 
     @property
@@ -173,8 +173,8 @@ class Basins(Result, shown_as="basins"):
                     i
                     for i, (X, size) in enumerate(rests)
                     if each.X is not None
-                    and abs(size - each.size) <= RUNS_ALIKE
-                    and pose_difference(X, each.X, length) <= RUNS_ALIKE
+                    and abs(size - each.size) <= RUN_END_DIFFERENCE_TOL
+                    and compare_poses(X, each.X, length) <= RUN_END_DIFFERENCE_TOL
                 ),
                 None,
             )
@@ -263,7 +263,7 @@ def basins(
     ------
     BadRequest
         Unknown name, a platform dof that is not observed, a singular goal, or too many starts.
-    PoseNotReached, NoReachablePose
+    PoseReachFailure, NoReachablePose
         The goal, or all starts are out of reach.
 
     Notes
@@ -278,11 +278,11 @@ def basins(
     <Basins: 3rrr_m1, observing 1, 2, 3: 100 % of 25 starts end at the goal x=0,y=0,z=0,phi=0deg>
     """
     setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed)
-    asked = asked_pose(goal)
+    asked = parse_pose(goal)
     setup = setup.telling([asked])
     if plane is not None and grid is not None:
         raise BadRequest(f"--grid {grid}: cannot be combined with --plane", remedy="Omit one.")
-    (target,) = configurations_at(setup, [asked])
+    (target,) = solve_configurations(setup, [asked])
     task = ServoTask.between(setup, target, target, Conditions(depth=depth))
     search = BasinSearch(setup, target, task, jobs or os.cpu_count() or 1)
     return search.over(search.plane(plane, steps) if grid is None else Grid.parse(grid, FLOW_STARTS), seed)
@@ -309,8 +309,8 @@ class BasinSearch:
         """Return the reached poses of a plane, by default one through the goal."""
         motion, X = self.setup.motion, self.goal.pose(self.setup.motion.link)
         if plane is not None:
-            fixed = as_pose(plane)
-        elif motion.planar:
+            fixed = convert_to_pose(plane)
+        elif motion.is_planar:
             fixed = Pose(phi=float(place_of(motion, X, ("phi",))[0]))
         else:
             fixed = Pose(z=float(motion.position(X)[2])) if motion.shifts == 3 else Pose()
@@ -330,7 +330,7 @@ class BasinSearch:
                 f"at most {most:,}",
                 remedy="Choose fewer --steps or a coarser --grid.",
             )
-        X, possible = poses_over(motion, grid, name, grid.places())
+        X, possible = list_grid_poses(motion, grid, name, grid.places())
         found = self._abreast(X, possible, seed) if self.flow else self._one_by_one(X, grid)
         if not len(found.outcomes):
             raise NoReachablePose(name, f"the grid {grid}", f"{count} were tried")
@@ -371,13 +371,13 @@ class BasinSearch:
         """Return one of the starts X (n, 4, 4) with the same outcome: the nearest to their centre, if small steps lead
         there from the zero configuration; else the nearest of the first few to which they do."""
         away = np.linalg.norm(X[:, :3, 3] - np.median(X[:, :3, 3], axis=0), axis=1)
-        near = [self.setup.motion.pose(each) for each in X[np.argsort(away, kind="stable")[:FLOW_EXAMPLES]]]
-        return next(filter(self._starts, near), near[0])
+        near = [self.setup.motion.pose(each) for each in X[np.argsort(away, kind="stable")[:FLOW_EXAMPLES_MAX]]]
+        return next(filter(self._can_start, near), near[0])
 
-    def _starts(self, pose: Pose) -> bool:
+    def _can_start(self, pose: Pose) -> bool:
         """Return True if a single run can start at a pose with its printed digits."""
         try:
-            (at,) = configurations_at(self.setup, [Pose.parse(str(pose))])
+            (at,) = solve_configurations(self.setup, [Pose.parse(str(pose))])
             ServoTask.between(self.setup, at, self.goal)
         except HrsynthError:
             return False
@@ -399,7 +399,9 @@ class BasinSearch:
         # a step of few runs takes as long as one of a thousand: the last of all parts go on together
         first, *others = self._run_all(
             [
-                partial(_follow_flow, flow.bare(), horizon, RUN_AWAY * length, X[share], FLOW_FEW // count)
+                partial(
+                    _follow_flow, flow.bare(), horizon, RUN_ESCAPE_DISTANCE_MAX * length, X[share], FLOW_FEW // count
+                )
                 for share in shares
             ]
         )
@@ -477,7 +479,9 @@ class BasinSearch:
 def hindrances(setup: ObservedRobot) -> tuple[str, ...]:
     """Return the reasons why runs of a robot cannot be batched."""
     own = set(map(id, setup.segments))
-    kinds = dict.fromkeys("" if each.by_segment else each.kind for each in setup.observed if id(each) not in own)
+    kinds = dict.fromkeys(
+        "" if each.is_segment_direction else each.kind for each in setup.observed if id(each) not in own
+    )
     found = [f"observations of kind {kind}" if kind else "observed links other than the default ones" for kind in kinds]
     if setup.mechanism.stops:
         found.append("a joint has limits")
@@ -492,7 +496,7 @@ def place_of(motion: PlatformMotion, X: Array, names: Sequence[str]) -> Array:
 
 def _at(outcome: Outcome, X: Array, length: float) -> Outcome:
     """Return the outcome of batched runs that end at X (4, 4), of which one was continued from there."""
-    if outcome.X is not None and pose_difference(outcome.X, X, length) <= RUNS_ALIKE:
+    if outcome.X is not None and compare_poses(outcome.X, X, length) <= RUN_END_DIFFERENCE_TOL:
         return outcome
     return Outcome(RunOutcome(UNDECIDED, "a single run does not stay at the end of these"))
 
@@ -510,7 +514,7 @@ def _simulate(task: ServoTask, starts: Sequence[ClosedConfiguration | None]) -> 
         if start is None:
             found.append(Outcome(RunOutcome(UNDECIDED, "no closed configuration was found there")))
             continue
-        if task.law.in_front(start) < SEEN_ABOVE:
+        if task.law.in_front(start) < VISIBLE_SINE_MIN:
             found.append(Outcome(RunOutcome(SIGHT, "an observed feature is out of view at the start")))
             continue
         run = loop.simulate(start, task.conditions.horizon)

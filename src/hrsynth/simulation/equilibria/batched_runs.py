@@ -19,31 +19,31 @@ from ...geometry.vectors import Array, times
 from ...progress import report
 from ...results import Value
 from ...tolerances import (
-    AT_REST,
-    DAMPED,
-    FLOW_ANEW,
+    CONTROLLER_DAMPING_MIN,
+    EQUILIBRIUM_SPEED_TOL,
     FLOW_CLEAR,
     FLOW_CONTRACTED,
+    FLOW_DAMPING_FRACTION,
     FLOW_NEAR,
-    FLOW_SERVED,
-    FLOW_SHORTEST_STEP,
-    FLOW_SLOPE,
-    FLOW_STRETCHED,
-    FLOW_TURNED,
-    FLOW_WALL,
-    FLOW_WEAK,
-    FLOWED,
-    RUNS_ALIKE,
-    SERVED,
+    FLOW_NEWTON_ERROR_TOL,
+    FLOW_REFRESH_DISTANCE_MAX,
+    FLOW_SLOPE_STEP_MAX,
+    FLOW_STEP_ERROR_TOL,
+    FLOW_STEP_MIN,
+    REACH_BOUNDARY_MARGIN_FRACTION,
+    REVERSED_LEG_MARGIN_FRACTION,
+    RUN_END_DIFFERENCE_TOL,
+    SERVO_CONVERGED_TOL,
+    STRETCHED_LEG_MARGIN_FRACTION,
 )
 from ..run import AWAY, EFFORT, LOST, REST, SERVED_AT, TIME
 from .flow import CommandedMotion, Flags, Flow, Places
 
 GAMMA = 1 / (2 + np.sqrt(2))
 E32 = 6 + np.sqrt(2)
-LONGEST_STEP = 2.0
+RUN_STEP_MAX = 2.0
 """Time constants: a longer step of an implicit method would stay at an unstable equilibrium."""
-POLISHED = 4
+RUN_END_NEWTON_STEPS_COUNT = 4
 """Newton steps at the end of a run whose error vanishes."""
 
 
@@ -68,7 +68,9 @@ class Runs(Value):
         while len(left):
             gap = np.abs(self.X[left] - self.X[left[0]])
             gap[:, :3, 3] /= length
-            alike = (gap.max(axis=(1, 2)) <= RUNS_ALIKE) & (np.abs(self.size[left] - self.size[left[0]]) <= RUNS_ALIKE)
+            alike = (gap.max(axis=(1, 2)) <= RUN_END_DIFFERENCE_TOL) & (
+                np.abs(self.size[left] - self.size[left[0]]) <= RUN_END_DIFFERENCE_TOL
+            )
             alike &= (self.flipped[left] == self.flipped[left[0]])[:, seen].all(axis=1)
             found.append(left[alike])
             left = left[~alike]
@@ -95,7 +97,7 @@ class BatchedRuns:
         """All runs to their ends, or to the ``horizon`` (time constants)."""
         self.follow(horizon)
         size = self._at(np.arange(len(self.X))).size
-        self.stopped[(self.stopped == SERVED_AT) & ~(size <= SERVED)] = LOST
+        self.stopped[(self.stopped == SERVED_AT) & ~(size <= SERVO_CONVERGED_TOL)] = LOST
         return Runs(self.X, size, self.stopped, self.flipped, self.active, self.weak, self.times)
 
     def follow(self, horizon: float, few: int = 0) -> Self:
@@ -140,8 +142,8 @@ class BatchedRuns:
         # any slopes give order 2: those of a run are kept for some steps while the law changes evenly
         anew = np.flatnonzero(self.old[live] >= FLOW_KEPT)
         if len(anew):
-            ahead, met = rate(np.repeat(FLOW_SLOPE * np.eye(d), len(anew), axis=0), anew)
-            slope = np.where(met[:, None], ahead - np.tile(f[anew], (d, 1)), 0.0) / FLOW_SLOPE
+            ahead, met = rate(np.repeat(FLOW_SLOPE_STEP_MAX * np.eye(d), len(anew), axis=0), anew)
+            slope = np.where(met[:, None], ahead - np.tile(f[anew], (d, 1)), 0.0) / FLOW_SLOPE_STEP_MAX
             self.slopes[live[anew]] = slope.reshape(d, -1, d).transpose(1, 2, 0)
             self.old[live[anew]] = 0
         J = self.slopes[live]
@@ -163,18 +165,20 @@ class BatchedRuns:
         turned = np.sum(here.u * there.u, axis=2) < 0
         met &= there.reached & ~(turned & flow.pointed).any(axis=1)
         k3 = solved(flow.rate(y, there.moves) - E32 * (k2 - f1) - 2 * (k1 - f))
-        error = np.max(np.abs(h / 6 * (k1 - 2 * k2 + k3)), axis=1) / FLOWED
+        error = np.max(np.abs(h / 6 * (k1 - 2 * k2 + k3)), axis=1) / FLOW_STEP_ERROR_TOL
         error = np.where(met & np.isfinite(error), error, np.inf)
         good = error <= 1
         with np.errstate(divide="ignore"):
             factor = np.where(met, np.clip(0.8 / np.cbrt(error), 0.2, 4.0), 0.25)
         done = live[good]
         self.X[done], self.times[done] = Y[good], self.times[done] + self.steps[done]
-        self.steps[live] = np.minimum(self.steps[live] * factor, LONGEST_STEP)
+        self.steps[live] = np.minimum(self.steps[live] * factor, RUN_STEP_MAX)
         here = _merge(here, there, good)
         changed = self._cross_stretched(live, here, met)
         changed = changed | self._release(live, here, good) | self._weaken(live, here, good)
-        uneven = changed | (here.weakest < FLOW_WEAK * DAMPED) | (~good & (self.old[live] > 0))
+        uneven = (
+            changed | (here.weakest < FLOW_DAMPING_FRACTION * CONTROLLER_DAMPING_MIN) | (~good & (self.old[live] > 0))
+        )
         self.old[live] = np.where(uneven, FLOW_KEPT, self.old[live] + good)
         if changed.any():
             here = _merge(here, self._at(live), changed)
@@ -187,10 +191,10 @@ class BatchedRuns:
         margins = np.where(self.active[live], np.inf, here.margins)
         leg = np.argmin(margins, axis=1)
         least, seen = margins[np.arange(len(live)), leg], flow.seen[leg]
-        short, turning = self.steps[live] < FLOW_SHORTEST_STEP, seen & flow.points[leg]
+        short, turning = self.steps[live] < FLOW_STEP_MIN, seen & flow.points[leg]
         stuck = short & ~met & ~turning
-        lost = stuck & (least > FLOW_STRETCHED)
-        through = np.flatnonzero((stuck & seen & ~lost) | (short & turning & (least < FLOW_TURNED)))
+        lost = stuck & (least > STRETCHED_LEG_MARGIN_FRACTION)
+        through = np.flatnonzero((stuck & seen & ~lost) | (short & turning & (least < REVERSED_LEG_MARGIN_FRACTION)))
         if len(through):
             came = self._cross(live[through], leg[through], least[through], here.velocity[through])
             lost[through] = stuck[through] & ~came
@@ -200,7 +204,7 @@ class BatchedRuns:
             runs = live[walled]
             self.active[runs, leg[walled]] = True
             self.X[runs] = self._on_wall(self.X[runs], self.flipped[runs], self.active[runs])
-            self.steps[runs] = 2 * FLOW_SHORTEST_STEP
+            self.steps[runs] = 2 * FLOW_STEP_MIN
         self.stopped[live[lost]] = LOST
         changed = np.zeros_like(met)
         changed[walled] = changed[through] = True
@@ -219,7 +223,7 @@ class BatchedRuns:
         after = np.where((flow.points[leg] | ~through)[:, None], velocity, self._at(runs).moves)
         time = np.where(through, -2 * time, time)
         self.X[runs] = flow.move(self.X[runs], time[:, None] * (velocity + after) / np.where(through, 1, 2)[:, None])
-        self.steps[runs] = np.where(flow.points[leg], self.steps[runs], 2 * FLOW_SHORTEST_STEP)
+        self.steps[runs] = np.where(flow.points[leg], self.steps[runs], 2 * FLOW_STEP_MIN)
         stretched = np.arange(len(flow.legs)) == leg[:, None]
         short = np.any(stretched & (flow.margins(self.X[runs], self.flipped[runs]) <= 0), axis=1) & ~flow.points[leg]
         runs, stretched, least = runs[short], stretched[short], margin[came][short]
@@ -228,11 +232,11 @@ class BatchedRuns:
 
     def _weaken(self, live: Places, here: CommandedMotion, good: Flags) -> Flags:
         """Take S anew where it counts; which runs these are."""
-        near = good & (here.weakest < FLOW_WEAK * DAMPED) & (self.stopped[live] == "")
-        self.weak[live[near & (here.weakest < DAMPED)]] = True
+        near = good & (here.weakest < FLOW_DAMPING_FRACTION * CONTROLLER_DAMPING_MIN) & (self.stopped[live] == "")
+        self.weak[live[near & (here.weakest < CONTROLLER_DAMPING_MIN)]] = True
         apart = np.abs(self.X[live] - self.taken[live])
         apart[:, :3, 3] /= self.flow.batch.length
-        near &= apart.max(axis=(1, 2)) > FLOW_ANEW
+        near &= apart.max(axis=(1, 2)) > FLOW_REFRESH_DISTANCE_MAX
         runs = live[near]
         if len(runs):
             found, closed = self.flow.roots(self.X[runs], self.flipped[runs])
@@ -244,10 +248,12 @@ class BatchedRuns:
         free = self.active[live] & ~here.held & good[:, None]
         some = free.any(axis=1)
         self.active[live[some]] &= ~free[some]
-        self.steps[live[some]] = np.minimum(self.steps[live[some]], FLOW_SHORTEST_STEP * 2)
+        self.steps[live[some]] = np.minimum(self.steps[live[some]], FLOW_STEP_MIN * 2)
         return np.asarray(some)
 
-    def _on_wall(self, X: Array, flipped: Flags, active: Flags, margin: float | Array = FLOW_WALL) -> Array:
+    def _on_wall(
+        self, X: Array, flipped: Flags, active: Flags, margin: float | Array = REACH_BOUNDARY_MARGIN_FRACTION
+    ) -> Array:
         """The poses next to X (n, 4, 4) where the active legs have a ``margin`` (n, 1) (two Newton steps)."""
         for _ in range(2):
             miss = np.where(active, margin - self.flow.margins(X, flipped), 0.0)
@@ -259,23 +265,23 @@ class BatchedRuns:
         """Take runs to where the error vanishes, by Newton's method. The undamped law is that method with short steps:
         where whole ones contract so fast that they converge (a quarter would do: Deuflhard, *Newton Methods for
         Nonlinear Problems*, section 2.1) and no leg comes near its limit, both end at the same pose."""
-        firm = (here.weakest >= FLOW_WEAK * DAMPED) & (here.size <= FLOW_NEAR)
+        firm = (here.weakest >= FLOW_DAMPING_FRACTION * CONTROLLER_DAMPING_MIN) & (here.size <= FLOW_NEAR)
         firm &= np.all(here.margins > FLOW_CLEAR, axis=1)
-        some = np.flatnonzero((firm | (here.size <= FLOW_SERVED)) & (self.stopped[live] == ""))
+        some = np.flatnonzero((firm | (here.size <= FLOW_NEWTON_ERROR_TOL)) & (self.stopped[live] == ""))
         if not len(some):
             return
         runs, X, speed = live[some], self.X[live[some]], np.linalg.norm(here.velocity[some], axis=1)
         self.X[runs] = self.flow.move(X, here.velocity[some])
         there = self._at(runs)
         slow = ~(np.linalg.norm(there.velocity, axis=1) <= FLOW_CONTRACTED * speed)
-        for _ in range(POLISHED - 1):
+        for _ in range(RUN_END_NEWTON_STEPS_COUNT - 1):
             slow |= ~np.all(there.margins > FLOW_CLEAR, axis=1)
             self.X[runs] = self.flow.move(self.X[runs], there.moves)
             there = self._at(runs)
-        back = (slow | ~(there.size <= SERVED)) & (here.size[some] > FLOW_SERVED)
+        back = (slow | ~(there.size <= SERVO_CONVERGED_TOL)) & (here.size[some] > FLOW_NEWTON_ERROR_TOL)
         self.X[runs[back]] = X[back]
         some, runs = some[~back], runs[~back]
-        self.times[runs] += np.log(np.maximum(here.size[some] / FLOW_SERVED, 1.0))
+        self.times[runs] += np.log(np.maximum(here.size[some] / FLOW_NEWTON_ERROR_TOL, 1.0))
         self.stopped[runs] = SERVED_AT
 
     def _end(self, live: Places, here: CommandedMotion, horizon: float) -> None:
@@ -283,7 +289,7 @@ class BatchedRuns:
         speed = np.linalg.norm(here.velocity, axis=1)
         shift = np.linalg.norm(self.X[live][:, :3, 3] - self.first[live][:, :3, 3], axis=1)
         for word, at_end in (
-            (REST, speed <= AT_REST * here.size),
+            (REST, speed <= EQUILIBRIUM_SPEED_TOL * here.size),
             (TIME, self.times[live] >= horizon),
             (AWAY, shift > self.farthest),
         ):

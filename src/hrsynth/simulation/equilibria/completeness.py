@@ -10,15 +10,15 @@ from itertools import product
 import numpy as np
 
 from ...analysis.observed import ObservedRobot
-from ...budgets import SIGN_BOXES, SIGN_CHOICES
+from ...budgets import REVERSED_LEG_CHOICES_MAX, ZERO_ERROR_BOXES_MAX
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.locked_twists import leg_twists
+from ...kinematics.locked_twists import compute_leg_twists
 from ...kinematics.velocity_relation import ObservationModel
 from ...mechanism.pose import Pose
-from ...progress import part
+from ...progress import report_part
 from ...results import Value
-from ...tolerances import COVER_REACH, SHORTEST_ROD
+from ...tolerances import POSITION_BOX_HALF_WIDTH_FRACTION, SLIDING_ROD_LENGTH_MIN
 from ..law import directions
 from .critical_poses import CriticalPoses, PoseToJoints
 from .descent import descend, sharpen_points
@@ -37,7 +37,7 @@ from .exhaustive_search import SubdivisionResult, cover
 from .search import CountedCriticalPoint
 from .subdivision import CriticalBox
 
-CLOSING_STARTS = 3000
+CLOSURE_START_COORDINATES_MAX = 3000
 """Coordinates that are scattered where the robot is to be closed at proved poses, at most."""
 
 
@@ -61,11 +61,11 @@ class CompletenessProof(Value):
     ) -> CompletenessProof:
         """Subdivide the poses of a goal; for all critical points into ``boxes`` at most, if given, by ``jobs``
         processes."""
-        with part("poses with zero error"):
-            found = cover(setup, goal, vanishing=True, budget=boxes or SIGN_BOXES, jobs=jobs)
+        with report_part("poses with zero error"):
+            found = cover(setup, goal, vanishing=True, budget=boxes or ZERO_ERROR_BOXES_MAX, jobs=jobs)
         if boxes is None:
             return cls(system, setup, found, None)
-        with part("all equilibria"):
+        with report_part("all equilibria"):
             return cls(system, setup, found, cover(setup, goal, budget=boxes, jobs=jobs))
 
     def find_missed(
@@ -75,7 +75,7 @@ class CompletenessProof(Value):
         robot is closed there, from these and (of each ``turn`` but the first) from coordinates scattered about them."""
         found: list[CountedCriticalPoint] = []
         if turn:
-            some = np.resize(q, (min(CLOSING_STARTS, 10 * len(q)), q.shape[1]))
+            some = np.resize(q, (min(CLOSURE_START_COORDINATES_MAX, 10 * len(q)), q.shape[1]))
             q = np.concatenate([q, some + np.random.default_rng(turn).normal(size=some.shape)])
         seen = [directions(at, self.observation_model)[0] for at in known]
         for each in (self.vanishing, self.every):
@@ -100,11 +100,11 @@ class CompletenessProof(Value):
     def complete_signs(self, lists: Sequence[SignedModes], desired: Array) -> list[SignedModes]:
         """The lists of modes with what boxes prove, and those of all other choices of signs."""
         labels = [each.leg for each in self.observation_model.observations]
-        if 2 ** len(labels) > SIGN_CHOICES:
+        if 2 ** len(labels) > REVERSED_LEG_CHOICES_MAX:
             return list(lists)
         known = self.vanishing
         counts: Counter[tuple[str, ...]] | None = None
-        if known.complete and known.bounded and not known.locked:
+        if known.is_complete and known.bounded and not known.locked:
             counts = Counter(
                 tuple(leg for leg, u, w in zip(labels, each.directions, desired, strict=True) if u @ w < 0)
                 for each in known.found
@@ -124,7 +124,7 @@ class CompletenessProof(Value):
             for each in sorted(every, key=lambda each: each not in met)
         ]
 
-    def proves(self, rest: Equilibrium) -> bool:
+    def is_isolated(self, rest: Equilibrium) -> bool:
         """Return True if boxes prove that an equilibrium is isolated, though E is nearly flat there."""
         told, u = self.every, directions(rest.configuration, self.observation_model)[0]
         return told is not None and told.place(rest.configuration, u) is not None
@@ -138,14 +138,14 @@ class CompletenessProof(Value):
             told.place(each.configuration, directions(each.configuration, self.observation_model)[0]) for each in rests
         ]
         held = [
-            told.holds(each.configuration)
+            told.has_searched(each.configuration)
             and (told.loop is None or len(each.orthogonal_legs) < told.loop.flat)
-            and not self._locks(told.unread, each.configuration)
+            and not self._is_leg_locked(told.unread, each.configuration)
             for each, place in zip(rests, places, strict=True)
             if place is None
         ]
-        within = None if told.bounded or told.error is None else COVER_REACH * told.error.length
-        shorter = SHORTEST_ROD * told.error.length if told.short and told.error is not None else None
+        within = None if told.bounded or told.error is None else POSITION_BOX_HALF_WIDTH_FRACTION * told.error.length
+        shorter = SLIDING_ROD_LENGTH_MIN * told.error.length if told.short and told.error is not None else None
         alone = tuple(self._alone(told, each) for k, each in enumerate(told.found) if k not in places)
         return CompletenessReport(
             told,
@@ -157,12 +157,12 @@ class CompletenessProof(Value):
             len(held) - sum(held),
         )
 
-    def _locks(self, labels: Sequence[str], at: ClosedConfiguration) -> bool:
+    def _is_leg_locked(self, labels: Sequence[str], at: ClosedConfiguration) -> bool:
         """Return True if the joints of a leg lock: they move its end in fewer directions than at the zero
         configuration."""
         start, base = self.setup.all_samples.start, self.setup.mechanism.base
         return any(
-            leg_twists(at, leg, (), base).shape[1] < leg_twists(start, leg, (), base).shape[1]
+            compute_leg_twists(at, leg, (), base).shape[1] < compute_leg_twists(start, leg, (), base).shape[1]
             for leg in self.setup.decomposition.legs
             if leg.label in labels
         )

@@ -16,15 +16,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...batch.enclosures import BoxFormula, trace_formula
-from ...budgets import CONE_BOXES, CONES_AT_ONCE
-from ...geometry.affine import affine, stack
+from ...budgets import CONE_BATCH_COUNT, CONE_SLICES_MAX
+from ...geometry.affine import make_affine, stack
 from ...geometry.vectors import Array
-from ...tolerances import AFFINE_ROUNDING, CHAIN_ROUNDING, FOLLOWED, NARROWEST_RISING_CONE, SHORTEST_SLICE
+from ...tolerances import (
+    AFFINE_ROUNDING,
+    CHAIN_ROUNDING,
+    HIDDEN_ROBOT_RESIDUAL_TOL,
+    NARROWEST_RISING_CONE,
+    SHORTEST_SLICE,
+)
 from .pose_error import Number, PoseError
 
 LONG_SLICE = 1 / 16
 """Length of a slice above which it is made shorter before its cone is cut."""
-LONGER = 1.5
+CONE_SLICE_GROWTH_FRACTION = 1.5
 """Factor by which the next slice is longer after a proved one."""
 
 
@@ -135,7 +141,7 @@ class ConeProver:
             return [*found.margins, *(x for each in found.seen for rate in zip(*each.rates, strict=True) for x in rate)]
 
         made = trace_formula(jacobian, n)
-        found = made.at([affine(np.zeros(1), np.zeros((1, n)), np.zeros(1))] * n)[len(error.limbs) :]
+        found = made.at([make_affine(np.zeros(1), np.zeros((1, n)), np.zeros(1))] * n)[len(error.limbs) :]
         return cls(
             error, W, np.array([each.v[0, 0] for each in found]).reshape(-1, n), trace_formula(along, 2 * n), made
         )
@@ -149,7 +155,11 @@ class ConeProver:
         rho, values = 1.0, np.linalg.svd(self.Q, compute_uv=False)
         for _ in range(40):
             d, mean = self.changes(rho)
-            bound = values[-1] ** 2 * (1 - FOLLOWED) - values[0] * (1 + FOLLOWED) * (d + mean) - d * mean
+            bound = (
+                values[-1] ** 2 * (1 - HIDDEN_ROBOT_RESIDUAL_TOL)
+                - values[0] * (1 + HIDDEN_ROBOT_RESIDUAL_TOL) * (d + mean)
+                - d * mean
+            )
             if bound > 0.1 * values[-1] ** 2:
                 return rho, float(bound)
             rho *= 0.8
@@ -161,7 +171,7 @@ class ConeProver:
         off = rho * np.eye(n)
         # noise ε = w / ρ: x = W w
         forms = [
-            affine(np.zeros(1), (row @ off)[None], np.full(1, AFFINE_ROUNDING * rho * np.abs(row).sum()))
+            make_affine(np.zeros(1), (row @ off)[None], np.full(1, AFFINE_ROUNDING * rho * np.abs(row).sum()))
             for row in self.W
         ]
         found = self.jacobian.at(forms)
@@ -171,7 +181,7 @@ class ConeProver:
         rest = np.linalg.norm(np.abs(shift) + np.array([each.r[0] for each in rates]).reshape(self.Q.shape))
         if not (np.isfinite(slopes).all() and all(each.low[0] > 0 for each in margins)):
             return np.inf, np.inf
-        linear = np.sqrt(np.linalg.norm(np.einsum("ijk,ilk->jl", slopes, slopes), 2)) * (1 + FOLLOWED)
+        linear = np.sqrt(np.linalg.norm(np.einsum("ijk,ilk->jl", slopes, slopes), 2)) * (1 + HIDDEN_ROBOT_RESIDUAL_TOL)
         return float(linear + rest), float(linear / 2 + rest)
 
     @cached_property
@@ -197,7 +207,7 @@ class ConeProver:
         around = np.concatenate([cones.half[:, :, None] * np.eye(n), np.zeros((count, n, n))], axis=-1)
         found = self.formula.at(
             [
-                affine(middle @ row, np.einsum("cks,k->cs", part, row), off * np.abs(row).sum())
+                make_affine(middle @ row, np.einsum("cks,k->cs", part, row), off * np.abs(row).sum())
                 for middle, part, off in (
                     (centre, slopes, rounding[:, 0]),
                     (cones.middle, around, np.full(count, AFFINE_ROUNDING)),
@@ -208,11 +218,13 @@ class ConeProver:
         reached = np.ones(count, dtype=bool)
         for each in found[:k]:
             reached &= each.low > 0
-        times = affine(t, (off * np.concatenate([face, np.zeros_like(face)], axis=1))[:, None], AFFINE_ROUNDING * t)
+        times = make_affine(
+            t, (off * np.concatenate([face, np.zeros_like(face)], axis=1))[:, None], AFFINE_ROUNDING * t
+        )
         inverse = times.inverse()
         e, rate = (stack(part) for part in (found[k : k + len(self.Q)], found[k + len(self.Q) :]))
         Qy, Qw = (
-            affine(middle @ self.Q.T, np.einsum("cks,rk->crs", part, self.Q), off * np.abs(self.Q).sum(axis=1))
+            make_affine(middle @ self.Q.T, np.einsum("cks,rk->crs", part, self.Q), off * np.abs(self.Q).sum(axis=1))
             for middle, part, off in (
                 (centre, slopes, rounding),
                 (cones.middle, around, np.full_like(t, AFFINE_ROUNDING)),
@@ -264,12 +276,12 @@ def prove_cones(prover: ConeProver, wanted: float) -> ProvedCones:
     core, rise = prover.core()
     cones, boxes = RisingCones.all(prover.error.size, core, rise), 0
     target = wanted
-    while boxes < CONE_BOXES:
+    while boxes < CONE_SLICES_MAX:
         todo = np.flatnonzero(cones.level < target)
         if not len(todo):
             break
         # those that hold all others up first
-        todo = todo[np.argsort(cones.level[todo], kind="stable")[:CONES_AT_ONCE]]
+        todo = todo[np.argsort(cones.level[todo], kind="stable")[:CONE_BATCH_COUNT]]
         rest = np.ones(len(cones), dtype=bool)
         rest[todo] = False
         part, others = cones.kept(todo), cones.kept(rest)
@@ -285,7 +297,7 @@ def prove_cones(prover: ConeProver, wanted: float) -> ProvedCones:
         across = np.argmax(np.where(part.half > NARROWEST_RISING_CONE, weights, -1.0), axis=1)
         narrow = ~np.any(part.half > NARROWEST_RISING_CONE, axis=1)
         shorter = ~proved & (part.step > np.where(narrow, SHORTEST_SLICE, LONG_SLICE))
-        part.step = np.where(proved, LONGER * part.step, part.step / np.where(shorter, 2, 1))
+        part.step = np.where(proved, CONE_SLICE_GROWTH_FRACTION * part.step, part.step / np.where(shorter, 2, 1))
         cut = ~proved & ~shorter
         if cut.any():
             # a cone that cannot be cut is as far as it goes: nothing need go higher

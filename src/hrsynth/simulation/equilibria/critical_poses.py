@@ -17,38 +17,38 @@ from numpy.typing import NDArray
 from ...analysis.branch.carried_vectors import CarriedVector, SweptChains
 from ...analysis.observed import ObservedRobot
 from ...budgets import (
-    POSE_BESIDE,
+    MIRRORED_RODS_MAX,
+    NEARBY_POSE_STARTS_FRACTION,
+    POSE_CONFIGURATIONS_MAX,
+    POSE_DRAWS_PER_START_COUNT,
     POSE_LATE,
-    POSE_MIRRORS,
-    POSE_NEWTON,
+    POSE_NEWTON_FRACTION,
     POSE_QUIET,
     POSE_ROUNDS,
     POSE_STARTS,
-    POSE_THINNED,
-    POSE_TRIES,
 )
 from ...closed_forms.legs import OnRod
-from ...geometry.so3 import quaternions
+from ...geometry.so3 import convert_to_quaternions
 from ...geometry.vectors import Array, transform
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism.observation import Observation
 from ...mechanism.observations.direction import SeenAxis
 from ...progress import report
 from ...results import Value
-from ...tolerances import COVER_REACH, FOLLOWED, SAME_ENDING
+from ...tolerances import CRITICAL_POINT_DISTANCE_TOL, HIDDEN_ROBOT_RESIDUAL_TOL, POSITION_BOX_HALF_WIDTH_FRACTION
 from .descent import CriticalPoint, descend
 from .error import ErrorSystem
 from .exhaustive_search import reachable_box
-from .pose_error import NotEnclosed, PoseError
-from .pose_system import LegSystem, unbound
+from .pose_error import EnclosureFailure, PoseError
+from .pose_system import LegSystem, is_free_sliding_rod
 
-LONGEST_STEP = 0.25
+CRITICAL_POSE_STEP_MAX = 0.25
 """Longest change of a coordinate in a step."""
 Fit = Callable[[Array], NDArray[np.bool_]]
 """Test of configurations (c, N)."""
 BESIDE = (0.1, 0.3, 0.6, 1.0)
 """Distance (characteristic lengths, components of a quaternion) of starts from poses already found, about."""
-FARTHER = 3.0
+START_BOX_WIDTH_FRACTION = 3.0
 """Factor of the box of starts over the searched one, if legs do not bound it."""
 
 
@@ -91,7 +91,7 @@ def critical_poses(
     pose."""
     try:
         error = PoseError.of(setup, goal)
-    except NotEnclosed:
+    except EnclosureFailure:
         return None
     rng, systems = np.random.default_rng([seed, 2]), [LegSystem.of(error, held) for held in _held_sets(error)]
     found, continua = _none(systems[0]), dict[tuple[int, ...], CriticalPoses]()
@@ -113,7 +113,7 @@ def _apart(found: CriticalPoses, drawn: CriticalPoses) -> CriticalPoses:
     every = _join([found, drawn])
     marks, met, kept = every.marks, every.met.copy(), list(range(len(found)))
     for k in range(len(found), len(marks)):
-        alike = np.flatnonzero(np.abs(marks[kept] - marks[k]).max(axis=1) < SAME_ENDING)
+        alike = np.flatnonzero(np.abs(marks[kept] - marks[k]).max(axis=1) < CRITICAL_POINT_DISTANCE_TOL)
         if len(alike):
             met[kept[alike[0]]] += met[k]
         else:
@@ -129,7 +129,7 @@ def _held_sets(error: PoseError) -> list[tuple[int, ...]]:
     held = [chosen for size in range(min(len(idle), error.size - 1) + 1) for chosen in combinations(idle, size)]
     return [
         (*chosen, *free)
-        for free in ((), *((i,) for i in watched if i is not None and unbound(error.limbs[i])))
+        for free in ((), *((i,) for i in watched if i is not None and is_free_sliding_rod(error.limbs[i])))
         for chosen in held
     ]
 
@@ -141,7 +141,7 @@ def _beside(system: LegSystem, found: CriticalPoses, count: int, rng: np.random.
     x = np.zeros((count, n))
     x[:, :k] = (found.p[some] / error.length - error.p) @ error.shifts
     if n > k:
-        x[:, k:] = quaternions(found.R[some] @ error.R.T) @ system.span
+        x[:, k:] = convert_to_quaternions(found.R[some] @ error.R.T) @ system.span
     return x + rng.normal(size=x.shape) * rng.choice(BESIDE, size=(count, 1))
 
 
@@ -153,17 +153,22 @@ def _round(
     poses that are known; half of the others are random poses, of half a leg's joints are so, which are more often near
     its limits."""
     error = system.error
-    low, high, _ = reachable_box(error, FARTHER * COVER_REACH)
+    low, high, _ = reachable_box(error, START_BOX_WIDTH_FRACTION * POSITION_BOX_HALF_WIDTH_FRACTION)
     k, n = error.shifts.shape[1], system.quaternion.stop
     count = POSE_STARTS
     x = np.concatenate(
-        [rng.uniform(low[:k], high[:k], (POSE_THINNED * count, k)), rng.normal(size=(POSE_THINNED * count, n - k))],
+        [
+            rng.uniform(low[:k], high[:k], (POSE_DRAWS_PER_START_COUNT * count, k)),
+            rng.normal(size=(POSE_DRAWS_PER_START_COUNT * count, n - k)),
+        ],
         axis=1,
     )
-    own = system.draw(system.about_legs(x[: len(x) // 4], FARTHER, rng), rng)[: count // 2]
+    own = system.draw(system.about_legs(x[: len(x) // 4], START_BOX_WIDTH_FRACTION, rng), rng)[: count // 2]
     y = np.concatenate([own, system.draw(x, rng)])[:count]
     if len(old):
-        near = system.draw(_beside(system, old, 4 * round(POSE_BESIDE * count), rng), rng)[: round(POSE_BESIDE * count)]
+        near = system.draw(_beside(system, old, 4 * round(NEARBY_POSE_STARTS_FRACTION * count), rng), rng)[
+            : round(NEARBY_POSE_STARTS_FRACTION * count)
+        ]
         beside, families = _lead_starts(system, near, rng)
         some, more = _lead_starts(system, rng.permutation(y)[: len(y) - len(near)], rng)
         return _join([some, replace(beside, met=0 * beside.met)]), families | more
@@ -177,11 +182,17 @@ def _lead_starts(
     error = system.error
     with np.errstate(all="ignore"):
         index = rng.integers(system.size[0] - system.size[1] + 1, size=len(y))
-        points = descend(system, y, np.where(rng.random(len(y)) < POSE_NEWTON, -1, index), 0)
-        kept = [each for each in points if all(abs(each.multipliers[row]) > SAME_ENDING for row in system.holding)]
+        points = descend(system, y, np.where(rng.random(len(y)) < POSE_NEWTON_FRACTION, -1, index), 0)
+        kept = [
+            each
+            for each in points
+            if all(abs(each.multipliers[row]) > CRITICAL_POINT_DISTANCE_TOL for row in system.holding)
+        ]
         y = np.array([each.q for each in kept]).reshape(len(kept), system.size[0])
-        falling = np.array([np.sum(each.curvatures < -SAME_ENDING) for each in kept], dtype=np.intp)
-        flat = np.array([np.sum(np.abs(each.curvatures) <= SAME_ENDING) for each in kept], dtype=np.intp)
+        falling = np.array([np.sum(each.curvatures < -CRITICAL_POINT_DISTANCE_TOL) for each in kept], dtype=np.intp)
+        flat = np.array(
+            [np.sum(np.abs(each.curvatures) <= CRITICAL_POINT_DISTANCE_TOL) for each in kept], dtype=np.intp
+        )
         found = CriticalPoses(
             error.length * system.point(y),
             system.rotation(y),
@@ -190,12 +201,12 @@ def _lead_starts(
             np.ones(len(y), dtype=np.intp),
         )
         reached = system.is_reached(y)
-        across = np.abs(np.einsum("cla,la->cl", found.directions, system.wanted)) < SAME_ENDING
+        across = np.abs(np.einsum("cla,la->cl", found.directions, system.wanted)) < CRITICAL_POINT_DISTANCE_TOL
     families: dict[tuple[int, ...], CriticalPoses] = {}
     for k in np.flatnonzero(reached & (flat > 0)):
-        families[int(falling[k]), int(flat[k]), round(kept[k].value / SAME_ENDING), *across[k].astype(int)] = (
-            found.some(np.array([k]))
-        )
+        families[
+            int(falling[k]), int(flat[k]), round(kept[k].value / CRITICAL_POINT_DISTANCE_TOL), *across[k].astype(int)
+        ] = found.some(np.array([k]))
     return found.some(reached & (flat == 0)), families
 
 
@@ -215,7 +226,7 @@ def _join(parts: list[CriticalPoses]) -> CriticalPoses:
 def _mirror(error: PoseError, found: CriticalPoses) -> CriticalPoses:
     """With all choices of directions under which E is the same, where these are few."""
     signs = error.mirrors
-    if not 1 < len(signs) <= 2**POSE_MIRRORS:
+    if not 1 < len(signs) <= 2**MIRRORED_RODS_MAX:
         return found
     others = _join([replace(found, directions=found.directions * each) for each in signs[1:]])
     return _apart(found, replace(others, met=0 * others.met))
@@ -272,7 +283,12 @@ class PoseToJoints:
         near = [
             (
                 group,
-                np.array([np.argsort(np.abs(told[:, rows] - each[rows]).max(axis=1))[:POSE_TRIES] for each in wanted]),
+                np.array(
+                    [
+                        np.argsort(np.abs(told[:, rows] - each[rows]).max(axis=1))[:POSE_CONFIGURATIONS_MAX]
+                        for each in wanted
+                    ]
+                ),
             )
             for group, rows in self._groups()
         ]
@@ -314,7 +330,7 @@ class PoseToJoints:
         size, q = q.shape[1], q.copy()
         good, going = np.zeros(len(q), dtype=bool), np.arange(len(q))
         # poses far away are to be reached as well
-        longest = np.maximum(2 * LONGEST_STEP, 4 * np.abs(wanted).max(axis=1) / steps)
+        longest = np.maximum(2 * CRITICAL_POSE_STEP_MAX, 4 * np.abs(wanted).max(axis=1) / steps)
         for _ in range(steps):
             here = q[going]
             G, DG = self.system.closures(here)
@@ -328,7 +344,7 @@ class PoseToJoints:
                     J[:, rows, part.places] += part.sign * np.swapaxes(part.columns, -1, -2)
             J, off = np.concatenate([DG, J], axis=1), np.concatenate([G, off], axis=1)
             r = np.abs(off).max(axis=1)
-            good[going] = r < FOLLOWED
+            good[going] = r < HIDDEN_ROBOT_RESIDUAL_TOL
             left = ~good[going]
             going, here, J, off, r = going[left], here[left], J[left], off[left], r[left]
             if not len(going):

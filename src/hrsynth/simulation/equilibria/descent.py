@@ -15,17 +15,24 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ...budgets import ENDING_STEPS, FARTHEST_ENDING
+from ...budgets import EQUILIBRIUM_COORDINATE_MAX, EQUILIBRIUM_START_STEPS_MAX
 from ...geometry.vectors import Array, times
 from ...results import Value
-from ...tolerances import COMMAND_CUTOFF, COMMAND_STEP, CRITICAL, CRITICAL_FLAT, DEPENDENT, ERROR_ROUNDING
+from ...tolerances import (
+    COMMAND_DIFFERENCE_STEP_MAX,
+    COMMAND_RATE_CUTOFF_FRACTION,
+    CRITICAL_CURVATURE_TOL,
+    CRITICAL_GRADIENT_TOL,
+    DEPENDENT_EQUATION_TOL,
+    SQUARED_ERROR_ROUNDING_TOL,
+)
 from .error import CriticalPointEquations, ErrorSystem
 
-LONGEST_STEP = 0.25
+DESCENT_STEP_MAX = 0.25
 """Largest change of a coordinate in a step (characteristic lengths, radians)."""
-SHARPENING_STEPS = 4
+CRITICAL_NEWTON_STEPS_COUNT = 4
 """Newton's steps from a critical point that was found."""
-WALK_STEP = 0.3
+RANDOM_WALK_STEP_MAX = 0.3
 """Largest change of a coordinate in a random step between starts."""
 
 
@@ -61,9 +68,9 @@ class CriticalPoint(Value):
     value: float
 
     @property
-    def vanishes(self) -> bool:
+    def has_zero_error(self) -> bool:
         """Return True if e = 0, as far as E = ½ ‖e‖², a difference of numbers of size one, resolves it."""
-        return self.value < ERROR_ROUNDING
+        return self.value < SQUARED_ERROR_ROUNDING_TOL
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +126,7 @@ class Expansion:
         """Return the curvatures of the k-th configuration, ascending, without those of internal motions that are
         internal there too: an arm with a redundant joint has others where it is stretched."""
         values, d = self.curvatures[k], self.freedoms
-        return np.sort(np.concatenate([values[:d], values[d:][np.abs(values[d:]) > CRITICAL_FLAT]]))
+        return np.sort(np.concatenate([values[:d], values[d:][np.abs(values[d:]) > CRITICAL_CURVATURE_TOL]]))
 
     @classmethod
     def of(cls, system: CriticalPointProblem, q: Array, idle: int) -> Expansion:
@@ -164,23 +171,27 @@ def close_loops(system: ErrorSystem, q: Array, steps: int = 12) -> Array:
     """Configurations (c, N) moved to the nearest closed ones, as far as Gauss and Newton's method does it."""
     for _ in range(steps):
         G, DG = system.closures(q)
-        if np.linalg.norm(G, axis=-1).max(initial=0.0) < CRITICAL:
+        if np.linalg.norm(G, axis=-1).max(initial=0.0) < CRITICAL_GRADIENT_TOL:
             break
         back = np.swapaxes(DG, -1, -2)
         # all equations, of which some may depend on others: the shortest step
         gram = DG @ back
-        gram += DEPENDENT * np.maximum(1.0, np.trace(gram, axis1=-2, axis2=-1))[:, None, None] * np.eye(G.shape[-1])
-        q = q + _shorten_steps(times(back, -np.linalg.solve(gram, G[..., None])[..., 0]), LONGEST_STEP)
+        gram += (
+            DEPENDENT_EQUATION_TOL
+            * np.maximum(1.0, np.trace(gram, axis1=-2, axis2=-1))[:, None, None]
+            * np.eye(G.shape[-1])
+        )
+        q = q + _shorten_steps(times(back, -np.linalg.solve(gram, G[..., None])[..., 0]), DESCENT_STEP_MAX)
     return q
 
 
-def are_closed(system: ErrorSystem, q: Array, within: float = CRITICAL) -> NDArray[np.bool_]:
+def are_closed(system: ErrorSystem, q: Array, within: float = CRITICAL_GRADIENT_TOL) -> NDArray[np.bool_]:
     """Return True for configurations (c, N) at which all equations of the loops hold, to a residual."""
     return np.asarray(np.linalg.norm(system.closures(q)[0], axis=-1) < within)
 
 
 def walk_at_random(
-    system: ErrorSystem, q: Array, rng: np.random.Generator, steps: int, longest: float = WALK_STEP
+    system: ErrorSystem, q: Array, rng: np.random.Generator, steps: int, longest: float = RANDOM_WALK_STEP_MAX
 ) -> Array:
     """Closed configurations (c, N), each led so many random steps along the loops; those that do not close stay."""
     for _ in range(steps):
@@ -196,31 +207,35 @@ def walk_at_random(
 
 
 def descend(
-    system: CriticalPointProblem, q: Array, index: NDArray[np.intp], idle: int, farthest: float = FARTHEST_ENDING
+    system: CriticalPointProblem,
+    q: Array,
+    index: NDArray[np.intp],
+    idle: int,
+    farthest: float = EQUILIBRIUM_COORDINATE_MAX,
 ) -> list[CriticalPoint]:
     """The critical points to which starts (c, N) lead, each sought as one of an index (c,), or (−1) by Newton's method
     whatever it is; none with a coordinate beyond ``farthest``."""
-    if isinstance(system, ErrorSystem) and system.supposes:
+    if isinstance(system, ErrorSystem) and system.has_assumed_depths:
         return find_loop_zeros(system, q, index, idle)
     found: list[CriticalPoint] = []
-    for _ in range(ENDING_STEPS):
+    for _ in range(EQUILIBRIUM_START_STEPS_MAX):
         if not len(q):
             break
         at = Expansion.of(system, q, idle)
-        done = at.residual < CRITICAL
+        done = at.residual < CRITICAL_GRADIENT_TOL
         found += [
             CriticalPoint(q[k], at.multipliers[k], float(at.residual[k]), at.curvatures_of(k), float(at.E[k]))
             for k in map(int, np.flatnonzero(done))
         ]
         up = np.arange(at.curvatures.shape[-1]) < np.minimum(index, at.freedoms)[:, None]
-        size = np.maximum(np.abs(at.curvatures), CRITICAL_FLAT)
+        size = np.maximum(np.abs(at.curvatures), CRITICAL_CURVATURE_TOL)
         # near a critical point: Newton's method, whatever it is
         near = (at.residual < 1e-3) & (np.abs(at.slope / size)[:, : at.freedoms].max(axis=-1, initial=0.0) < 0.05)
         near |= index < 0
         sign = np.where(near[:, None], -np.sign(at.curvatures), np.where(up, 1.0, -1.0))
-        sign[:, at.freedoms :] *= np.abs(at.curvatures[:, at.freedoms :]) > CRITICAL_FLAT
-        step = _shorten_steps(times(at.directions, sign * at.slope / size), LONGEST_STEP)
-        q = q + step + _shorten_steps(at.closing, LONGEST_STEP)
+        sign[:, at.freedoms :] *= np.abs(at.curvatures[:, at.freedoms :]) > CRITICAL_CURVATURE_TOL
+        step = _shorten_steps(times(at.directions, sign * at.slope / size), DESCENT_STEP_MAX)
+        q = q + step + _shorten_steps(at.closing, DESCENT_STEP_MAX)
         going = ~done & np.isfinite(q).all(axis=-1) & (np.abs(q).max(axis=-1) < farthest)
         q, index = q[going], index[going]
     return found
@@ -232,15 +247,15 @@ def sharpen_points(system: CriticalPointProblem, points: Sequence[CriticalPoint]
     if not points:
         return []
     q = np.array([each.q for each in points])
-    for _ in range(SHARPENING_STEPS):
+    for _ in range(CRITICAL_NEWTON_STEPS_COUNT):
         at = Expansion.of(system, q, idle)
-        size = np.where(np.abs(at.curvatures) > CRITICAL, at.curvatures, np.inf)
+        size = np.where(np.abs(at.curvatures) > CRITICAL_GRADIENT_TOL, at.curvatures, np.inf)
         q = q + times(at.directions, -at.slope / size) + at.closing
     at = Expansion.of(system, q, idle)
     return [
         CriticalPoint(q[k], at.multipliers[k], float(at.residual[k]), at.curvatures_of(k), float(at.E[k]))
         for k in range(len(q))
-        if at.residual[k] < CRITICAL
+        if at.residual[k] < CRITICAL_GRADIENT_TOL
     ]
 
 
@@ -250,7 +265,7 @@ def find_loop_zeros(system: ErrorSystem, q: Array, index: NDArray[np.intp], idle
     ``curvatures`` are real parts of the eigenvalues of the loop, linearised, over −λ."""
     found: list[CriticalPoint] = []
     flows = index == 0
-    for _ in range(ENDING_STEPS):
+    for _ in range(EQUILIBRIUM_START_STEPS_MAX):
         if not len(q):
             break
         with np.errstate(all="ignore"):
@@ -261,22 +276,24 @@ def find_loop_zeros(system: ErrorSystem, q: Array, index: NDArray[np.intp], idle
             lost = np.asarray(~np.isfinite(gram).all(axis=(-1, -2)) | ~np.isfinite(pull).all(axis=-1))
             pull, gram = np.where(lost[:, None], 0.0, pull), np.where(lost[:, None, None], 0.0, gram)
             mu, p, v, M = tangents.multipliers(pull), tangents.closing(at.G), times(back, pull), back @ gram @ Z
-            there = (q[:, None] + COMMAND_STEP * back).reshape(-1, q.shape[1])
+            there = (q[:, None] + COMMAND_DIFFERENCE_STEP_MAX * back).reshape(-1, q.shape[1])
             turned = (
                 CriticalPointEquations(system, list(there.T)).command_terms()[1].reshape(*back.shape) - pull[:, None]
             )
-            A = back @ (np.swapaxes(np.nan_to_num(turned), -1, -2) / COMMAND_STEP + at.bend(mu, error=False) @ Z)
+            A = back @ (
+                np.swapaxes(np.nan_to_num(turned), -1, -2) / COMMAND_DIFFERENCE_STEP_MAX + at.bend(mu, error=False) @ Z
+            )
         residual = np.maximum(np.linalg.norm(at.G, axis=-1), np.linalg.norm(v, axis=-1))
-        done = (residual < CRITICAL) & ~lost
-        inverse = np.linalg.pinv(M, rcond=COMMAND_CUTOFF, hermitian=True)
+        done = (residual < CRITICAL_GRADIENT_TOL) & ~lost
+        inverse = np.linalg.pinv(M, rcond=COMMAND_RATE_CUTOFF_FRACTION, hermitian=True)
         for k in np.flatnonzero(done):
             values = np.linalg.eigvals(inverse[k] @ A[k])
             kept = values[np.argsort(np.abs(values))[idle:]].real
             found.append(CriticalPoint(q[k], mu[k], float(residual[k]), np.sort(kept), float(E[k])))
         # steps of half a unit of time where the loop is fast, longer ones where it slows down
         slow = np.where(flows, 2 * np.minimum(1.0, np.linalg.norm(times(inverse, v), axis=-1)), 0.0)
-        step = -times(np.linalg.pinv(slow[:, None, None] * M + A, rcond=COMMAND_CUTOFF), v)
-        q = q + _shorten_steps(times(Z, step), LONGEST_STEP) + _shorten_steps(p, LONGEST_STEP)
-        going = ~done & ~lost & np.isfinite(q).all(axis=-1) & (np.abs(q).max(axis=-1) < FARTHEST_ENDING)
+        step = -times(np.linalg.pinv(slow[:, None, None] * M + A, rcond=COMMAND_RATE_CUTOFF_FRACTION), v)
+        q = q + _shorten_steps(times(Z, step), DESCENT_STEP_MAX) + _shorten_steps(p, DESCENT_STEP_MAX)
+        going = ~done & ~lost & np.isfinite(q).all(axis=-1) & (np.abs(q).max(axis=-1) < EQUILIBRIUM_COORDINATE_MAX)
         q, flows = q[going], flows[going]
     return found

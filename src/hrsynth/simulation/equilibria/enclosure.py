@@ -23,12 +23,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...analysis.branch.redundant import dependent_rows
-from ...budgets import TUBE_RADII, TUBE_WIDER
-from ...geometry.affine import AffineForms, affine, combine
+from ...analysis.branch.redundant import count_independent_equations
+from ...budgets import TUBE_RADII_COUNT, TUBE_WIDENING_FRACTION
+from ...geometry.affine import AffineForms, combine, make_affine
 from ...geometry.vectors import Array, times
 from ...results import Value
-from ...tolerances import AFFINE_ROUNDING, THINNEST_TUBE
+from ...tolerances import AFFINE_ROUNDING, TUBE_RADIUS_MIN
 from .descent import CriticalPoint, Tangents
 from .error import CriticalPointEquations, ErrorSystem
 
@@ -81,8 +81,8 @@ def _enclose(system: ErrorSystem, q: Array, idle: int) -> list[EnclosedPoint | N
     def evaluated(radius: Array, some: Any = slice(None)) -> tuple[AffineForms, AffineForms, CriticalPointEquations]:
         """F (c, n) and K (c, n, n) over boxes of radii (c, n) about some of the points, n = N + m."""
         middle, mult, mask = q[some], mu[some], known[some]
-        forms = [affine(middle[:, i], np.zeros((len(middle), 0)), radius[:, i]) for i in range(size)]
-        held = affine(mult, np.zeros((*mult.shape, 0)), radius[:, size:])
+        forms = [make_affine(middle[:, i], np.zeros((len(middle), 0)), radius[:, i]) for i in range(size)]
+        held = make_affine(mult, np.zeros((*mult.shape, 0)), radius[:, size:])
         at = CriticalPointEquations(system, forms)
         F, K = (
             AffineForms(np.zeros((1, *shape)), np.zeros(shape))
@@ -109,16 +109,16 @@ def _enclose(system: ErrorSystem, q: Array, idle: int) -> list[EnclosedPoint | N
         F, K, _ = evaluated(still)
         Y = np.linalg.inv(K.v[0] + _lost_rank(K.v[0]))
         e = combine(Y, F).size
-        radius = TUBE_WIDER * e + THINNEST_TUBE
+        radius = TUBE_WIDENING_FRACTION * e + TUBE_RADIUS_MIN
         done, found = np.zeros(len(q), dtype=bool), still.copy()
         inertia, left = np.full(len(q), -1), np.arange(len(q))
-        for _ in range(TUBE_RADII):
+        for _ in range(TUBE_RADII_COUNT):
             _, K, _ = evaluated(radius, left)
             M = (np.eye(known.shape[-1]) - combine(Y[left], K)).size
             wanted = e[left] + times(M, radius)
             fits = np.all(wanted * (1 + AFFINE_ROUNDING) < radius, axis=-1)
             found[left[fits]], done[left[fits]] = radius[fits], True
-            left, radius = left[~fits], (TUBE_WIDER * np.maximum(wanted, radius))[~fits]
+            left, radius = left[~fits], (TUBE_WIDENING_FRACTION * np.maximum(wanted, radius))[~fits]
             if not len(left):
                 break
         _, K, at = evaluated(found)
@@ -241,5 +241,6 @@ def unexplained_rows(system: ErrorSystem) -> tuple[str, ...]:
     return tuple(
         loop.name
         for loop in system.system.loops
-        if chosen.count(loop.name) < len(loop.rows) and chosen.count(loop.name) != dependent_rows(system.system, loop)
+        if chosen.count(loop.name) < len(loop.rows)
+        and chosen.count(loop.name) != count_independent_equations(system.system, loop)
     )

@@ -13,30 +13,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis.analysis_declaration import analysis
-from ...analysis.aspects.leg_forms import LegPattern, pattern
+from ...analysis.aspects.leg_forms import LegPattern, build_leg_pattern
 from ...analysis.aspects.path import CLEAR
-from ...analysis.aspects.path_segments import path_coordinates
+from ...analysis.aspects.path_segments import list_path_coordinates
 from ...analysis.aspects.vector_expressions import NoLegForm
 from ...analysis.branch.carried_vectors import SweptChains
 from ...analysis.configuration_report import ConfigurationAnalysis
 from ...analysis.measured import MeasuredRobot
 from ...analysis.modes.modes import AssemblyModes, modes
 from ...analysis.observed import CameraLike, Jobs, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike
-from ...analysis.pose_requests import configurations_at
-from ...budgets import COVER_BOXES
+from ...analysis.pose_requests import solve_configurations
+from ...budgets import SUBDIVISION_BOXES_MAX
 from ...constraints.condition import Condition
-from ...constraints.pattern import ConstraintPattern, placing_links
-from ...errors import HrsynthError, LoopsNotClosed
-from ...geometry.affine import affine
-from ...geometry.vectors import Array, pose_difference, steady_order, transform
-from ...kinematics.assembly import of_links
+from ...constraints.pattern import ConstraintPattern, list_placing_links
+from ...errors import HrsynthError, LoopClosureFailure
+from ...geometry.affine import make_affine
+from ...geometry.vectors import Array, compare_poses, sort_rows, transform
+from ...kinematics.assembly import build_from_link_poses
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.limits import outside
+from ...kinematics.limits import list_joints_beyond
 from ...mechanism.observations.direction import SeenAxis
-from ...mechanism.pose import PoseLike, asked_pose
+from ...mechanism.pose import PoseLike, parse_pose
 from ...options import option
 from ...progress import report
-from ...tolerances import CRITICAL_FLAT, DAMPED, SAME_ENDING, SEEN_ABOVE, VANISHED
+from ...tolerances import (
+    CONTROLLER_DAMPING_MIN,
+    CRITICAL_CURVATURE_TOL,
+    CRITICAL_POINT_DISTANCE_TOL,
+    VISIBLE_SINE_MIN,
+    ZERO_ERROR_TOL,
+)
 from ..law import Depth, FixedDirections, Law, Measures, measure_all, supposed_planes
 from ..outcome import ANTIPODAL, BOUNDARY, GOAL, MODE, rest
 from ..servo import require_regular, require_seen, require_sight
@@ -48,11 +54,11 @@ from .equilibrium import CRITICAL, Equilibria, Equilibrium, SignedModes, stabili
 from .error import ErrorSystem
 from .search import CountedCriticalPoint, critical_points, in_mode
 
-MISSED_ROUNDS = 3
+PROVED_POSE_ROUNDS_COUNT = 3
 """Rounds in which it is tried to close the robot at the proved poses that are not in the list."""
-MODE_TRIES = 4
+MODE_WALKS_MAX = 4
 """Walks from an equilibrium that are tried to determine its operation mode."""
-NEARBY = 0.02
+MODE_WALK_FIRST_STEP_FRACTION = 0.02
 """Step (characteristic lengths, radians) of the first of these walks."""
 
 
@@ -81,7 +87,7 @@ def equilibria(
     complete: Annotated[bool, option("Try to prove that the list is complete, by boxes of platform poses.")] = False,
     max_boxes: Annotated[
         int, option("Largest number of pose boxes (10,000 to 40,000 take a second).", "COUNT", low=1)
-    ] = COVER_BOXES,
+    ] = SUBDIVISION_BOXES_MAX,
     jobs: Jobs = None,
     seed: Seed = 0,
 ) -> Equilibria:
@@ -117,7 +123,7 @@ def equilibria(
     ------
     BadRequest
         Unknown name, a platform dof that is not observed, a singular goal, or a feature behind its camera.
-    PoseNotReached
+    PoseReachFailure
         The goal is out of reach.
 
     Notes
@@ -134,10 +140,10 @@ def equilibria(
     setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed)
     if complete:
         setup.by_segments("subdivision")
-    asked = [] if goal is None else [asked_pose(goal)]
+    asked = [] if goal is None else [parse_pose(goal)]
     setup = setup.telling(asked)
     require_seen(setup)
-    target = next(iter(configurations_at(setup, asked)), setup.all_samples.start)
+    target = next(iter(solve_configurations(setup, asked)), setup.all_samples.start)
     require_regular(ConfigurationAnalysis.of(setup), "goal", target)
     search = EquilibriumSearch.of(setup, target, depth)
     require_sight(setup, search.law, "goal", target)
@@ -180,23 +186,23 @@ class EquilibriumSearch:
         minima: bool = False,
         rounds: Iterable[Array] | None = None,
         complete: bool = False,
-        max_boxes: int = COVER_BOXES,
+        max_boxes: int = SUBDIVISION_BOXES_MAX,
         jobs: int = 1,
     ) -> Equilibria:
         """Return the equilibria found; ``minima`` and ``rounds`` as for :func:`.critical_points`, for minima alone
         neither lists nor enclosures; ``complete``: try to prove that they are all, with at most ``max_boxes`` boxes and
         ``jobs`` processes."""
         setup, motion = self.setup, self.setup.motion
-        further = None if minima or self.system.supposes else self._further(seed)
+        further = None if minima or self.system.has_assumed_depths else self._further(seed)
         found = critical_points(
             self.system, setup, self.goal, seed, minima=minima, rounds=rounds, further=further, fit=self._near_mode
         )
         found = found if further is None else replace(found, unmet=further.unmet)
         isolated = self._in_mode(found.isolated)
         covers = None
-        if not minima and all(each.by_segment for each in setup.observed):
+        if not minima and all(each.is_segment_direction for each in setup.observed):
             covers = CompletenessProof.of(setup, self.goal, self.system, max_boxes if complete else None, jobs)
-        for turn in range(MISSED_ROUNDS):
+        for turn in range(PROVED_POSE_ROUNDS_COUNT):
             if covers is None:
                 break
             places = [(at, each.point.q) for each in isolated if (at := self._place(each.point.q)) is not None]
@@ -205,7 +211,7 @@ class EquilibriumSearch:
         isolated += [each for one in lists for each in self._new_modes(one, isolated, found.idle)]
         report("enclosures")
         boxes: list[EnclosedPoint | None] = [None] * len(isolated)
-        if not minima and not self.system.supposes:
+        if not minima and not self.system.has_assumed_depths:
             # with internal coordinates fixed, curvatures of motions that are internal elsewhere are not enclosed
             whole = [k for k, each in enumerate(isolated) if len(each.point.curvatures) <= self._freedoms]
             proved = enclose_points(self.system, [isolated[k].point for k in whole], found.idle)
@@ -217,7 +223,7 @@ class EquilibriumSearch:
         continua = [
             each
             for one in self._in_mode(found.continua)
-            if (each := self.read(one)) is not None and not (covers is not None and covers.proves(each))
+            if (each := self.read(one)) is not None and not (covers is not None and covers.is_isolated(each))
         ]
         measured = tuple(sorted({name for box in boxes if box for name in box.measured}))
         rests, continua = (_sort(each, motion.link, self.goal.model.length) for each in (rests, continua))
@@ -260,7 +266,7 @@ class EquilibriumSearch:
         """The lists of modes of those combinations of signs at which the error was found to vanish, that of the goal
         first."""
         known: dict[tuple[str, ...], AssemblyModes | None] = {}
-        for at in (self.goal, *(self._place(each.point.q) for each in found if each.point.vanishes)):
+        for at in (self.goal, *(self._place(each.point.q) for each in found if each.point.has_zero_error)):
             if at is not None and (reversed_ := self._reversed_legs(at)) not in known:
                 try:
                     known[reversed_] = modes(self.setup, at=at)
@@ -275,11 +281,11 @@ class EquilibriumSearch:
         if given.listed is None:
             return []
         places = [each.configuration for each in given.listed.modes if each.configuration is not None]
-        old = [at for each in found if each.point.vanishes and (at := self._place(each.point.q))]
+        old = [at for each in found if each.point.has_zero_error and (at := self._place(each.point.q))]
         new = [
             at
             for at in places
-            if not any(self.alike(at, each) and self._reversed_legs(each) == given.reversed for each in old)
+            if not any(self.is_same_pose(at, each) and self._reversed_legs(each) == given.reversed for each in old)
         ]
         if not new:
             return []
@@ -293,8 +299,10 @@ class EquilibriumSearch:
         key = q.tobytes()
         if key not in self._known:
             try:
-                self._known[key] = of_links(self.goal.model, partial(self.system.system.pose, values=q.tolist()))
-            except LoopsNotClosed:
+                self._known[key] = build_from_link_poses(
+                    self.goal.model, partial(self.system.system.pose, values=q.tolist())
+                )
+            except LoopClosureFailure:
                 self._known[key] = None
         return self._known[key]
 
@@ -306,7 +314,7 @@ class EquilibriumSearch:
     def _reversed_legs(self, at: ClosedConfiguration) -> tuple[str, ...]:
         """The legs whose direction is opposite to the desired one, as far as it is along it."""
         return tuple(
-            leg for leg, c in self._cosines(measure_all(at, self.law.observation_model)[0]) if c < VANISHED - 1
+            leg for leg, c in self._cosines(measure_all(at, self.law.observation_model)[0]) if c < ZERO_ERROR_TOL - 1
         )
 
     def _cosines(self, values: Measures) -> list[tuple[str, float]]:
@@ -314,11 +322,11 @@ class EquilibriumSearch:
         every = zip(self.law.observation_model.observations, values, self.desired, strict=True)
         return [(o.leg, float(u @ w)) for o, u, w in every if isinstance(o, SeenAxis)]
 
-    def alike(self, at: ClosedConfiguration, other: ClosedConfiguration) -> bool:
+    def is_same_pose(self, at: ClosedConfiguration, other: ClosedConfiguration) -> bool:
         """Return True if the platform is at the same pose."""
         return all(
-            pose_difference(at.pose(body), other.pose(body), self.goal.model.length) <= SAME_ENDING
-            for body in placing_links(self.setup.decomposition)
+            compare_poses(at.pose(body), other.pose(body), self.goal.model.length) <= CRITICAL_POINT_DISTANCE_TOL
+            for body in list_placing_links(self.setup.decomposition)
         )
 
     def read(self, found: CountedCriticalPoint, box: EnclosedPoint | None = None) -> Equilibrium | None:
@@ -326,23 +334,23 @@ class EquilibriumSearch:
         is to see."""
         motion, point = self.setup.motion, found.point
         at = self._place(point.q)
-        if at is None or self.law.in_front(at) < SEEN_ABOVE:
+        if at is None or self.law.in_front(at) < VISIBLE_SINE_MIN:
             return None
         command = self.law.at(at, FixedDirections(self.desired)(0.0))
-        if command.pull > SAME_ENDING:
+        if command.pull > CRITICAL_POINT_DISTANCE_TOL:
             return None
         error = command.size
         reversed_ = self._reversed_legs(at)
-        across = tuple(leg for leg, c in self._cosines(command.true) if abs(c) < VANISHED)
+        across = tuple(leg for leg, c in self._cosines(command.true) if abs(c) < ZERO_ERROR_TOL)
         kind, singular, boundary = CRITICAL, None, False
-        if error < VANISHED:
-            kind = ANTIPODAL if reversed_ else GOAL if self.alike(at, self.goal) else MODE
-        elif float(command.values[-1]) < DAMPED:
+        if error < ZERO_ERROR_TOL:
+            kind = ANTIPODAL if reversed_ else GOAL if self.is_same_pose(at, self.goal) else MODE
+        elif float(command.values[-1]) < CONTROLLER_DAMPING_MIN:
             why = rest(self.setup, at, command)
             singular, boundary = why.reason, why.name == BOUNDARY
         X = at.pose(motion.link)
         shift, turn = (np.inf, np.inf) if box is None else self._radius(box, X)
-        least = CRITICAL_FLAT if len(point.curvatures) > self._freedoms else SAME_ENDING
+        least = CRITICAL_CURVATURE_TOL if len(point.curvatures) > self._freedoms else CRITICAL_POINT_DISTANCE_TOL
         state = stability(
             point.curvatures if box is None or box.index is None else box.signs(len(point.curvatures)), least
         )
@@ -362,7 +370,7 @@ class EquilibriumSearch:
             across,
             singular,
             boundary,
-            tuple(outside(at.model, at.q)),
+            tuple(list_joints_beyond(at.model, at.q)),
             self._other_legs(at),
             found.met,
         )
@@ -370,7 +378,9 @@ class EquilibriumSearch:
     def _radius(self, box: EnclosedPoint, X: Array) -> tuple[float, float]:
         """Return the largest distance of the platform from its pose X (4, 4) over a box (m, rad)."""
         loops, motion = self.system.system, self.setup.motion
-        forms = [affine(np.array([x]), np.zeros((1, 0)), np.array([r])) for x, r in zip(box.q, box.radius, strict=True)]
+        forms = [
+            make_affine(np.array([x]), np.zeros((1, 0)), np.array([r])) for x, r in zip(box.q, box.radius, strict=True)
+        ]
         carrier, chain = SweptChains(loops, forms), loops.way(loops.body[motion.link])
         zero = loops.mechanism.links[motion.link].pose
         told = [transform(X, motion.point) / loops.length, *X[:3, :3].T]
@@ -406,9 +416,9 @@ class EquilibriumSearch:
         """Closed forms of the legs, which give their working modes; None if there are none."""
         setup = self.setup
         members = (setup.all_samples.start, *setup.configurations)
-        for each in path_coordinates(setup.decomposition, setup.samples.observation_model, setup.dof, members):
+        for each in list_path_coordinates(setup.decomposition, setup.samples.observation_model, setup.dof, members):
             try:
-                return pattern(setup.decomposition, (), each, members)
+                return build_leg_pattern(setup.decomposition, (), each, members)
             except NoLegForm:
                 continue
         return None
@@ -439,9 +449,9 @@ class EquilibriumSearch:
         """Return True for coordinates (c, N) near which configurations are of that mode."""
         good, rng = np.zeros(len(q), dtype=bool), np.random.default_rng(0)
         # what lies nearby may be nearly singular as well: then a little farther away
-        for number in range(MODE_TRIES):
+        for number in range(MODE_WALKS_MAX):
             if not good.all():
-                near = walk_at_random(self.system, q[~good], rng, 2, NEARBY * 2**number)
+                near = walk_at_random(self.system, q[~good], rng, 2, MODE_WALK_FIRST_STEP_FRACTION * 2**number)
                 good[~good] = in_mode(self.system, self.setup, near)
         return good
 
@@ -459,7 +469,7 @@ def _ways(rests: Sequence[Equilibrium], search: EquilibriumSearch) -> list[Equil
     groups: list[list[int]] = []
     for k in range(len(rests)):
         first = np.array([group[0] for group in groups], dtype=np.intp)
-        own = np.flatnonzero(np.abs(told[first] - told[k]).max(axis=1, initial=0.0) < SAME_ENDING)
+        own = np.flatnonzero(np.abs(told[first] - told[k]).max(axis=1, initial=0.0) < CRITICAL_POINT_DISTANCE_TOL)
         if len(own):
             groups[own[0]].append(k)
         else:
@@ -483,12 +493,14 @@ def _sort(rests: Sequence[Equilibrium], link: str, length: float) -> list[Equili
         [kinds.index(each.kind), not each.stable, each.error, *(X[:3, 3] / length), *X[:3, :3].ravel()]
         for each, X in zip(named, poses, strict=True)
     ]
-    return [named[i] for i in steady_order(np.array(rows, dtype=float).reshape(len(rows), 15), SAME_ENDING)]
+    return [
+        named[i] for i in sort_rows(np.array(rows, dtype=float).reshape(len(rows), 15), CRITICAL_POINT_DISTANCE_TOL)
+    ]
 
 
 def _telling_values(at: ClosedConfiguration, search: EquilibriumSearch) -> Array:
     """Return positions of the platform's links (characteristic lengths), their rotations, and all measured values."""
-    poses = [at.pose(body) for body in placing_links(search.setup.decomposition)]
+    poses = [at.pose(body) for body in list_placing_links(search.setup.decomposition)]
     return np.concatenate(
         [
             *(X[:3, 3] / search.goal.model.length for X in poses),

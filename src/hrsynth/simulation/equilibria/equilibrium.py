@@ -17,7 +17,7 @@ from ...kinematics.joint_coordinates import OfConfiguration
 from ...mechanism.pose import Pose
 from ...records import FLAT, As, Number, Record, Recorded, Shown, recorded
 from ...results import Result, Value
-from ...tolerances import SAME_ENDING
+from ...tolerances import CRITICAL_POINT_DISTANCE_TOL
 from ..law import Measures
 from .exhaustive_search import SubdivisionResult, join_boxes
 from .search import CriticalPoints
@@ -112,7 +112,7 @@ class SignedModes(Value):
         return self.boxes is not None or (self.listed is not None and self.listed.found.complete)
 
     @property
-    def empty(self) -> bool:
+    def is_proved_empty(self) -> bool:
         """Return True if it is proved that there is no such pose."""
         return self.boxes == 0
 
@@ -189,7 +189,7 @@ class CompletenessReport(Value):
     @recorded()
     def complete(self) -> bool:
         """True if the list and ``only_proved`` hold all equilibria in the box."""
-        return self.result.complete and not self.only_found
+        return self.result.is_complete and not self.only_found
 
     @property
     def reason(self) -> str:
@@ -328,7 +328,7 @@ class Equilibria(Result, shown_as="equilibria"):
     attracting_record = Shown(int, lambda self: len(self.stable), As("attracting"))
 
 
-def stability(curvatures: Sequence[float] | Array, least: float = SAME_ENDING) -> str:
+def stability(curvatures: Sequence[float] | Array, least: float = CRITICAL_POINT_DISTANCE_TOL) -> str:
     """Return the stability that the eigenvalues of a Hessian decide; small ones leave it undecided."""
     values = np.asarray(curvatures)
     if np.any(values < -least):

@@ -15,11 +15,19 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ...analysis.branch.carried_vectors import Product, SweptChains, Total, add_bend, add_slope, outer, row_product
-from ...analysis.branch.loops import CouplingEquation, JointLoop, LoopRow, LoopSystem, loop_system
-from ...geometry.affine import cross_product, stack
-from ...geometry.jets import Jet, angle
-from ...geometry.so3 import exponential
+from ...analysis.branch.carried_vectors import (
+    Product,
+    SweptChains,
+    Total,
+    add_bend,
+    add_slope,
+    build_row_product,
+    compute_outer_product,
+)
+from ...analysis.branch.loops import CouplingEquation, JointLoop, LoopRow, LoopSystem, build_loop_system
+from ...geometry.affine import compute_cross_forms, stack
+from ...geometry.jets import Jet, compute_jet_angle
+from ...geometry.so3 import convert_vectors_to_rotations
 from ...geometry.vectors import Array, cross, transform
 from ...kinematics.configuration import ClosedConfiguration, measure
 from ...kinematics.velocity_relation import ObservationModel
@@ -28,7 +36,7 @@ from ...mechanism.observation import Observation
 from ...mechanism.observations.direction import SeenAxis
 from ...mechanism.observations.encoder import AngleEncoder, SlideEncoder
 from ...results import Value
-from ...tolerances import RANK_CUTOFF
+from ...tolerances import RANK_CUTOFF_FRACTION
 
 Row = tuple[JointLoop, LoopRow]
 
@@ -56,9 +64,9 @@ class ErrorSums:
         self.slope.add((slice(None),), slope * e[..., None])
         column = slope[..., :, None]
         if self.gram is not None:
-            self.gram.add((slice(None), slice(None)), outer(column, column))
+            self.gram.add((slice(None), slice(None)), compute_outer_product(column, column))
         if self.bend is not None:
-            self.bend.add((slice(None), slice(None)), outer(column, column))
+            self.bend.add((slice(None), slice(None)), compute_outer_product(column, column))
             for product, weight in bends:
                 add_bend(self.bend, product, weight * e)
 
@@ -89,9 +97,11 @@ class DirectionTerm(Value):
         if sums.gram is not None:
             # ė · ė' = u̇ · u̇' − (u̇ · u_d) (u̇' · u_d), u̇ seen from what carries u_d
             rates = seen_rates(product, sums)
-            sums.gram.add((slice(None), slice(None)), outer(rates, rates) - outer(column, column))
+            sums.gram.add(
+                (slice(None), slice(None)), compute_outer_product(rates, rates) - compute_outer_product(column, column)
+            )
         if sums.bend is not None:
-            sums.bend.add((slice(None), slice(None)), -outer(column, column))
+            sums.bend.add((slice(None), slice(None)), -compute_outer_product(column, column))
             add_bend(sums.bend, product, -c)
 
 
@@ -132,7 +142,7 @@ class AngleTerm(Value):
         size = float(self.mark @ self.across) ** 2 + float(self.mark @ self.along) ** 2
         one, other = c.value * (1 / size), s.value * (-1 / size)
         slope = gradient(s, sums) * one[..., None] + gradient(c, sums) * other[..., None]
-        sums.add_square(angle(s.value, c.value), slope, [(s, one), (c, other)])
+        sums.add_square(compute_jet_angle(s.value, c.value), slope, [(s, one), (c, other)])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -175,10 +185,10 @@ class ObservationTerm(Value):
         sums.slope.add((slice(None),), (X * along[..., None, :]).sum(-1))
         gram = sum(each.slope[..., :, None] * each.slope[..., None, :] for each in e)
         if sums.gram is not None:
-            sums.gram.add((slice(None), slice(None)), outer(outer(X, gram), X))
+            sums.gram.add((slice(None), slice(None)), compute_outer_product(compute_outer_product(X, gram), X))
         if sums.bend is not None:
             bend = gram + sum(each.bend * each.value[..., None, None] for each in e)
-            sums.bend.add((slice(None), slice(None)), outer(outer(X, bend), X))
+            sums.bend.add((slice(None), slice(None)), compute_outer_product(compute_outer_product(X, bend), X))
             for place, product in enumerate(products):
                 add_bend(sums.bend, product, along[..., place])
 
@@ -226,7 +236,7 @@ def seen_rates(product: Product, sums: ErrorSums) -> Any:
     for part in product.x.parts:
         total.add((part.places, slice(None)), part.columns * part.sign)
     for part in product.y.parts:
-        total.add((part.places, slice(None)), cross_product(part.axes, x[..., None, :]) * -part.sign)
+        total.add((part.places, slice(None)), compute_cross_forms(part.axes, x[..., None, :]) * -part.sign)
     return total.sum
 
 
@@ -251,7 +261,7 @@ class ErrorSystem(Value):
         """Build the error of the values measured at a goal. ``generic`` configurations select independent equations;
         ``planes`` (3,), in metres, are those of the assumed depths, None where the law knows these."""
         mechanism = goal.model.mechanism
-        system = loop_system(mechanism, ())
+        system = build_loop_system(mechanism, ())
         values = measure(goal.model, goal.q, observation_model.reference, observation_model.observations)[2]
         terms = tuple(
             term(system, observation_model.reference, each, value, None if plane is None else plane * system.length)
@@ -280,7 +290,7 @@ class ErrorSystem(Value):
         return at.G, at.DG
 
     @property
-    def supposes(self) -> bool:
+    def has_assumed_depths(self) -> bool:
         """Return True if the law assumes depths, so that its command is no gradient of E."""
         return any(isinstance(each, ObservationTerm) and each.plane is not None for each in self.terms)
 
@@ -311,7 +321,7 @@ class CriticalPointEquations:
         self.like = values[0] * 0.0
         self.carrier = SweptChains(system.system, values)
         self.system = system
-        self.products = [row_product(self.carrier, *each) for each in system.rows]
+        self.products = [build_row_product(self.carrier, *each) for each in system.rows]
         closing, rates = Total(self.like, (count,)), Total(self.like, (count, size))
         for k, product in enumerate(self.products):
             closing.add((k,), product.value)
@@ -372,7 +382,7 @@ def independent(rates: Array, rank: int | None = None) -> list[int]:
     from scipy.linalg import qr
 
     if rank is None:
-        rank = int(np.median((np.linalg.svd(rates, compute_uv=False) > RANK_CUTOFF).sum(axis=-1)))
+        rank = int(np.median((np.linalg.svd(rates, compute_uv=False) > RANK_CUTOFF_FRACTION).sum(axis=-1)))
     _, _, order = qr(np.concatenate(list(rates), axis=-1).T, mode="economic", pivoting=True)
     return sorted(order[:rank].tolist())
 
@@ -413,6 +423,6 @@ def term(system: LoopSystem, reference: str, seen: Observation, value: Array, pl
             )
         case AngleEncoder():
             normal = seen.start - (seen.axis @ seen.start) * seen.axis
-            along = exponential(float(value[0]) * seen.axis) @ normal
+            along = convert_vectors_to_rotations(float(value[0]) * seen.axis) @ normal
             return AngleTerm(chains, R @ seen.mark, S @ cross(seen.axis, along), S @ along)
     raise NotImplementedError(type(seen).__name__)

@@ -12,7 +12,7 @@ from typing import Annotated
 import numpy as np
 
 from ...analysis.observed import ObservedRobot
-from ...budgets import COVER_BOXES
+from ...budgets import SUBDIVISION_BOXES_MAX
 from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
 from ...geometry.so3 import turn_about
 from ...geometry.vectors import Array
@@ -21,20 +21,20 @@ from ...mechanism import JointType
 from ...records import Recorded
 from ...results import Value
 from ...tolerances import (
-    COVER_MARGIN,
-    COVER_REACH,
-    COVER_ROOM,
-    FOLLOWED,
-    LOCKED_PLACE,
-    SAME_ENDING,
-    SHORTEST_ROD,
-    SINGULAR_BOX,
+    CRITICAL_POINT_DISTANCE_TOL,
+    HIDDEN_ROBOT_RESIDUAL_TOL,
+    LINEAR_PROGRAM_BOX_TOL,
+    LOCKED_PLACE_EDGE_FRACTION,
+    POSITION_BOX_FRACTION,
+    POSITION_BOX_HALF_WIDTH_FRACTION,
+    SINGULAR_BOX_MIN_FRACTION,
     SINGULAR_FINER,
+    SLIDING_ROD_LENGTH_MIN,
 )
 from .joint_error import JointError
 from .loop_error import LoopError, LoopSubdivision
 from .points_in_planes_error import PlaneError
-from .pose_error import NotEnclosed, PoseError
+from .pose_error import EnclosureFailure, PoseError
 from .spring_error import SpringError, SpringSubdivision
 from .subdivision import CriticalBox, Subdivision
 from .upu_legs import Struts
@@ -73,29 +73,33 @@ class SubdivisionResult(Value):
     """Flag: boxes are undecided because the limit was reached."""
 
     @property
-    def complete(self) -> bool:
+    def is_complete(self) -> bool:
         """Return True if these are all critical points there."""
         return not self.open and not self.reason
 
-    def holds(self, at: ClosedConfiguration) -> bool:
+    def has_searched(self, at: ClosedConfiguration) -> bool:
         """Return True if a configuration's pose was searched: not if a platform that only translates has a rotation
         that is none of the ``turns``, as it can in another assembly."""
         if self.error is None or self.error.coordinates is None or self.is_turned(at):
             return False
         (p, R), k = (each[0] for each in self.error.coordinates.of([at])), self.error.shifts.shape[1]
-        if any(limb.solve(limb.tip.value(p[None], R[None]), limb.mode)[0] < SHORTEST_ROD**2 for limb in self.short):
+        if any(
+            limb.solve(limb.tip.value(p[None], R[None]), limb.mode)[0] < SLIDING_ROD_LENGTH_MIN**2
+            for limb in self.short
+        ):
             return False
         idle = () if self.loop is None else self.loop.idle
         with np.errstate(invalid="ignore"):
             margins = [limb.solve(limb.tip.value(p[None], R[None]), limb.mode)[0][0] for limb in idle]
-        if any(abs(margin) < SAME_ENDING for margin in margins):
+        if any(abs(margin) < CRITICAL_POINT_DISTANCE_TOL for margin in margins):
             return False
         x = self.error.shifts.T @ (p - self.error.p)
         if self.error.turns.shape[1] == 1:
             x = np.append(x, turn_about(self.error.turns[:, 0], R @ self.error.R.T)[0])
         periods = np.where(np.arange(len(x)) < k, np.inf, 2 * np.pi)
         if any(
-            np.all(_away(x, middle[: len(x)], periods) <= half[: len(x)] + FOLLOWED) for middle, half in self.locked
+            np.all(_away(x, middle[: len(x)], periods) <= half[: len(x)] + HIDDEN_ROBOT_RESIDUAL_TOL)
+            for middle, half in self.locked
         ):
             return False
         if self.box is None:
@@ -113,7 +117,7 @@ class SubdivisionResult(Value):
         if error is None or error.coordinates is None or error.motion.rotations.shape[1]:
             return False
         R = error.coordinates.of([at])[1][0]
-        return all(np.abs(R - turn @ error.R).max() > SAME_ENDING for turn in self.turns)
+        return all(np.abs(R - turn @ error.R).max() > CRITICAL_POINT_DISTANCE_TOL for turn in self.turns)
 
     def place(self, at: ClosedConfiguration, u: Array) -> int | None:
         """Return the index of the critical point of a configuration with observed directions u (legs, 3); distant poses
@@ -131,7 +135,7 @@ class SubdivisionResult(Value):
             for each in self.found
         ]
         nearest = int(np.argmin(away))
-        return nearest if away[nearest] < SAME_ENDING else None
+        return nearest if away[nearest] < CRITICAL_POINT_DISTANCE_TOL else None
 
 
 def cover(
@@ -139,8 +143,8 @@ def cover(
     goal: ClosedConfiguration,
     *,
     vanishing: bool = False,
-    budget: int = COVER_BOXES,
-    reach: float = COVER_REACH,
+    budget: int = SUBDIVISION_BOXES_MAX,
+    reach: float = POSITION_BOX_HALF_WIDTH_FRACTION,
     jobs: int = 1,
 ) -> SubdivisionResult:
     """All critical points of the error to a goal that subdivision finds and proves, in every working mode: wherever
@@ -149,10 +153,10 @@ def cover(
     processes (``jobs``)."""
     try:
         error, families, struts = _families(setup, goal, vanishing)
-    except NotEnclosed as why:
+    except EnclosureFailure as why:
         return SubdivisionResult((), (), 1.0, 0, False, str(why))
     low, high, bounded = reachable_box(error, reach)
-    charts, endless = [each.list_charts(bounded) for each in families], families[0].endless
+    charts, endless = [each.list_charts(bounded) for each in families], families[0].is_unbounded
     loop = next((each for each in families if isinstance(each, LoopError | SpringError)), None)
     parts = [
         [_boxes(each, low, high, reach, vanishing or loop not in (None, each)) for each in some] for some in charts
@@ -171,13 +175,13 @@ def cover(
             for zero in each.zeros()
             if zero.error[0] == 0.0 or not each.vanishing or family.square is not None
         ):
-            if not any(_same(zero, other, family) for other in own):
+            if not any(_is_same_zero(zero, other, family) for other in own):
                 own.append(zero)
         own = [_on_line(each, family.error, error) if len(each.x) < error.size else each for each in own]
         found += [
             each
             for each in own
-            if not isinstance(loop, LoopError) or not any(_alike(each, other, loop) for other in found)
+            if not isinstance(loop, LoopError) or not any(_is_same_rod_zero(each, other, loop) for other in found)
         ]
     left, lost = (
         [corners for part in every for corners in _corners(part.error, boxes(part), error.size)]
@@ -187,9 +191,10 @@ def cover(
     meeting = [
         each
         for each in found
-        if each.error[0] > 0 and sum(isinstance(family, PlaneError) and family.holds(each.R) for family in families) > 1
+        if each.error[0] > 0
+        and sum(isinstance(family, PlaneError) and family.has_rotation(each.R) for family in families) > 1
     ]
-    near = SINGULAR_BOX * (high - low)[: error.size]
+    near = SINGULAR_BOX_MIN_FRACTION * (high - low)[: error.size]
     locked += [(each.x[: error.size], np.maximum(each.radius[: error.size], near)) for each in meeting]
     found = [each for each in found if each not in meeting]
     found = [replace(each, directions=each.directions * own) for own in error.mirrors for each in found]
@@ -216,19 +221,19 @@ def _families(
     setup: ObservedRobot, goal: ClosedConfiguration, vanishing: bool
 ) -> tuple[PoseError, list[JointError], Struts | None]:
     """The error, and all that boxes are to look at: the parts of which the closures are made up; raises
-    ``NotEnclosed``."""
+    ``EnclosureFailure``."""
     try:
         error = PoseError.of(setup, goal)
-    except NotEnclosed as why:
+    except EnclosureFailure as why:
         try:
             planes = PlaneError.families(setup, goal)
-        except NotEnclosed:
+        except EnclosureFailure:
             raise why from None
         return _read(planes[0].error), [*planes], None
     _read(error)
     if error.turns.shape[1] > 1:
         if vanishing:
-            raise NotEnclosed("the platform rotates about more than one axis")
+            raise EnclosureFailure("the platform rotates about more than one axis")
         return error, [SpringError.about(error)], None
     struts = Struts.of(setup, goal, error)
     if struts is not None:
@@ -236,16 +241,16 @@ def _families(
     families: list[JointError] = [JointError.of(error)]
     # in a plane what is at right angles to the desired directions does not fill curves
     if not vanishing and error.size > 2:
-        with suppress(NotEnclosed):
+        with suppress(EnclosureFailure):
             loop = LoopError.about(error)
             families += [*(replace(families[0], square=k) for k in range(2) if loop.flat > 1), loop]
     return error, families, None
 
 
 def _read(error: PoseError) -> PoseError:
-    """An error whose forms are read from joints; raises ``NotEnclosed`` where they are not."""
+    """An error whose forms are read from joints; raises ``EnclosureFailure`` where they are not."""
     if error.fitted:
-        raise NotEnclosed(f"forms are fitted to samples: {', '.join(error.fitted)}")
+        raise EnclosureFailure(f"forms are fitted to samples: {', '.join(error.fitted)}")
     return error
 
 
@@ -253,7 +258,7 @@ def _boxes(error: JointError, low: Array, high: Array, reach: float, vanishing: 
     """All of a chart; those of poses far away begin beyond the places where rods have no length."""
     ends = np.abs(error.ends).max(initial=0.0)
     if ends:
-        reach = max(reach, COVER_MARGIN * float(ends))
+        reach = max(reach, POSITION_BOX_FRACTION * float(ends))
         low, high = np.full(3, -reach), np.full(3, reach)
     corners = error.box(low, high, reach)
     if isinstance(error, LoopError | SpringError):
@@ -279,7 +284,7 @@ def _cut_long(every: Sequence[Subdivision], whole: Array, budget: int, jobs: int
         long = [
             (low, high)
             for low, high in join_boxes(chain(*own))
-            if np.isfinite(high - low).all() and np.any(high - low > LOCKED_PLACE * whole)
+            if np.isfinite(high - low).all() and np.any(high - low > LOCKED_PLACE_EDGE_FRACTION * whole)
         ]
         for each, boxes in zip(every, own, strict=True):
             chosen = [any(np.all((a <= low) & (high <= b)) for a, b in long) for low, high in boxes]
@@ -296,13 +301,13 @@ def _places(
     described by a point."""
     locked, long = list[tuple[Array, Array]](), list[tuple[Array, Array]]()
     low, high = (np.array([each[k] for each in left]).reshape(-1, len(whole)) for k in range(2))
-    near = SINGULAR_BOX * whole
+    near = SINGULAR_BOX_MIN_FRACTION * whole
     smallest, taken = np.all(high - low <= near, axis=1), np.zeros(len(left), dtype=bool)
     for a, b in places:
         beside = np.zeros(len(left), dtype=bool)
         while np.any(new := smallest & ~beside & ~taken & np.all((low <= b + near) & (a - near <= high), axis=1)):
             a, b, beside = np.minimum(a, low[new].min(axis=0)), np.maximum(b, high[new].max(axis=0)), beside | new
-        if np.all(b - a <= LOCKED_PLACE * whole):
+        if np.all(b - a <= LOCKED_PLACE_EDGE_FRACTION * whole):
             locked.append(((a + b) / 2, (b - a) / 2))
             taken |= beside
         else:
@@ -349,7 +354,7 @@ def _on_line(zero: CriticalBox, line: PoseError, error: PoseError) -> CriticalBo
     return replace(
         zero,
         x=error.shifts.T @ (line.p + line.shifts @ zero.x - error.p),
-        radius=np.abs(error.shifts.T @ line.shifts) @ zero.radius + FOLLOWED,
+        radius=np.abs(error.shifts.T @ line.shifts) @ zero.radius + HIDDEN_ROBOT_RESIDUAL_TOL,
         falling=None if zero.falling is None else zero.falling + 1,
     )
 
@@ -376,33 +381,35 @@ def reachable_box(error: PoseError, reach: float) -> tuple[Array, Array, bool]:
             found = linprog(sign * axis, A_ub=np.array(rows), b_ub=limits, bounds=(None, None)) if rows else None
             reached = found is not None and found.status == 0
             bounded &= reached
-            bounds.append(sign * found.fun - sign * COVER_ROOM if found is not None and reached else -sign * reach)
+            bounds.append(
+                sign * found.fun - sign * LINEAR_PROGRAM_BOX_TOL if found is not None and reached else -sign * reach
+            )
     low, high = np.array(bounds[::2]), np.array(bounds[1::2])
     turns = np.ones(error.turns.shape[1])
     return np.concatenate([low, -turns]), np.concatenate([high, turns]), bounded
 
 
-def _alike(one: CriticalBox, other: CriticalBox, loop: LoopError) -> bool:
+def _is_same_rod_zero(one: CriticalBox, other: CriticalBox, loop: LoopError) -> bool:
     """Return True if two enclosed zeros are at one pose with the same directions of two rods."""
-    return _meet(one, other, loop, list(range(loop.error.size))) and bool(
-        np.abs(one.directions - other.directions).max() < SAME_ENDING
+    return _has_common_values(one, other, loop, list(range(loop.error.size))) and bool(
+        np.abs(one.directions - other.directions).max() < CRITICAL_POINT_DISTANCE_TOL
     )
 
 
-def _same(one: CriticalBox, other: CriticalBox, error: JointError) -> bool:
+def _is_same_zero(one: CriticalBox, other: CriticalBox, error: JointError) -> bool:
     """Return True if two enclosed zeros are at one pose with the same directions, or opposite ones: enclosures of the
     observed directions meet; rotations that differ by half a turn count as equal."""
     watched = {each.limb for each in error.error.seen}
     own = [*range(error.error.size), *(k for k, i in enumerate(error.joints, error.error.size) if i in watched)]
     apart = np.linalg.norm(np.cross(one.directions, other.directions), axis=1).max(initial=0.0)
     turned = float(np.abs(one.R - other.R).max())
-    return _meet(one, other, error, own) and max(apart, turned) < SAME_ENDING
+    return _has_common_values(one, other, error, own) and max(apart, turned) < CRITICAL_POINT_DISTANCE_TOL
 
 
-def _meet(one: CriticalBox, other: CriticalBox, error: JointError, own: list[int]) -> bool:
+def _has_common_values(one: CriticalBox, other: CriticalBox, error: JointError, own: list[int]) -> bool:
     """Return True if enclosures of two zeros meet in some of the coordinates, up to periods."""
     away = _away(one.x[own], other.x[own], error.periods[own])
-    return bool(np.all(away <= one.radius[own] + other.radius[own] + FOLLOWED))
+    return bool(np.all(away <= one.radius[own] + other.radius[own] + HIDDEN_ROBOT_RESIDUAL_TOL))
 
 
 def _away(one: Array, other: Array, periods: Array) -> Array:

@@ -16,14 +16,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ...batch.configuration_builder import ConfigurationBuilder, rates
+from ...batch.configuration_builder import ConfigurationBuilder, compute_rates
 from ...batch.engine import Batch
 from ...closed_forms.legs import ClosedFormLeg, SlidingRod
-from ...geometry.so3 import exponential
+from ...geometry.so3 import convert_vectors_to_rotations
 from ...geometry.vectors import Array, cross, hat, solve_definite, times
 from ...kinematics.configuration import ClosedConfiguration
 from ...results import Value
-from ...tolerances import DAMPED, FLOW_SLOPE, FLOW_WEAK, SOLVED
+from ...tolerances import CLOSURE_SOLVER_TOL, CONTROLLER_DAMPING_MIN, FLOW_DAMPING_FRACTION, FLOW_SLOPE_STEP_MAX
 
 Flags = NDArray[np.bool_]
 Places = NDArray[np.int64]
@@ -123,18 +123,18 @@ class Flow(Value):
     def slopes(self, X: Array, flipped: Flags) -> Array:
         """The rates of the margins (n, legs, d)."""
         n, d = len(X), self.batch.span.shape[1]
-        steps = FLOW_SLOPE * np.concatenate([np.eye(d), -np.eye(d)])
+        steps = FLOW_SLOPE_STEP_MAX * np.concatenate([np.eye(d), -np.eye(d)])
         around = self.margins(
             self.move(np.tile(X, (2 * d, 1, 1)), np.repeat(steps, n, axis=0)), np.tile(flipped, (2 * d, 1))
         ).reshape(2, d, n, len(self.legs))
-        return np.asarray((around[0] - around[1]).transpose(1, 2, 0) / (2 * FLOW_SLOPE))
+        return np.asarray((around[0] - around[1]).transpose(1, 2, 0) / (2 * FLOW_SLOPE_STEP_MAX))
 
     def move(self, X: Array, y: Array) -> Array:
         """The poses (n, 4, 4) with coordinates y (n, d) in the chart about X: the point moved, the frame turned."""
         platform, span = self.batch.coordinates, self.batch.span
         p, R = platform.place(X)
         found = X.copy()
-        found[:, :3, :3] = exponential(y @ span[3:].T) @ R
+        found[:, :3, :3] = convert_vectors_to_rotations(y @ span[3:].T) @ R
         found[:, :3, 3] = p + y @ span[:3].T - found[:, :3, :3] @ platform.point
         return found
 
@@ -154,10 +154,10 @@ class Flow(Value):
         square, closed = np.empty((len(X), len(inverse), len(inverse))), np.zeros(len(X), dtype=bool)
         for bits, some in _groups(flipped):
             frames, closed[some] = self.mode_placer(bits).frames(X[some])
-            J, V = rates(model, frames, coordinates.link)
+            J, V = compute_rates(model, frames, coordinates.link)
             arms = hat(coordinates.place(X[some])[0] / model.length)
             V = inverse @ np.concatenate([(V[:, :3] - arms @ V[:, 3:]) * model.length, V[:, 3:]], axis=1)
-            inner = J @ J.transpose(0, 2, 1) + SOLVED * np.eye(J.shape[1])
+            inner = J @ J.transpose(0, 2, 1) + CLOSURE_SOLVER_TOL * np.eye(J.shape[1])
             across = J @ V.transpose(0, 2, 1)
             square[some] = V @ V.transpose(0, 2, 1) - across.transpose(0, 2, 1) @ np.linalg.solve(inner, across)
         values, Q = np.linalg.eigh(square)
@@ -203,10 +203,10 @@ def damped_inverse(A: Array, g: Array) -> tuple[Array, Array]:
         found = solve_definite(A, np.concatenate([g[..., None], np.broadcast_to(np.eye(d), A.shape)], axis=2))
         # the norm of A⁻¹ is at least 1 / λ for the least eigenvalue λ of A
         least = 1 / np.sqrt(np.square(found[..., 1:]).sum(axis=(1, 2)))
-    weak = ~(least >= (FLOW_WEAK * DAMPED) ** 2)
+    weak = ~(least >= (FLOW_DAMPING_FRACTION * CONTROLLER_DAMPING_MIN) ** 2)
     velocity, weakest = -found[..., 0], np.sqrt(least)
     values, V = np.linalg.eigh(A[weak])
-    inside = V.transpose(0, 2, 1) @ g[weak, :, None] / np.maximum(values, DAMPED**2)[..., None]
+    inside = V.transpose(0, 2, 1) @ g[weak, :, None] / np.maximum(values, CONTROLLER_DAMPING_MIN**2)[..., None]
     velocity[weak], weakest[weak] = -(V @ inside)[..., 0], np.sqrt(np.maximum(values[:, 0], 0.0))
     return velocity, weakest
 
@@ -216,14 +216,14 @@ def _along(normals: Array, A: Array, g: Array) -> tuple[Array, Array, Array]:
     g = Nᵀ μ."""
     found, weakest = np.zeros_like(g), np.zeros(len(g))
     _, values, right = np.linalg.svd(normals)
-    ranks = np.sum(values > DAMPED * values[:, :1], axis=1)
+    ranks = np.sum(values > CONTROLLER_DAMPING_MIN * values[:, :1], axis=1)
     for rank in np.unique(ranks[ranks < g.shape[1]]):
         some = np.flatnonzero(ranks == rank)
         K = right[some, rank:].transpose(0, 2, 1)
         inside, weakest[some] = damped_inverse(K.transpose(0, 2, 1) @ A[some] @ K, (g[some, None] @ K)[:, 0])
         found[some] = times(K, inside)
     rest = times(A, found) + g
-    push = np.linalg.pinv(normals.transpose(0, 2, 1), rcond=DAMPED) @ rest[..., None]
+    push = np.linalg.pinv(normals.transpose(0, 2, 1), rcond=CONTROLLER_DAMPING_MIN) @ rest[..., None]
     return found, weakest, push[..., 0]
 
 

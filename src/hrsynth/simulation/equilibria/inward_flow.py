@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...batch.enclosures import BoxFormula, trace_formula
-from ...budgets import INWARD_BOXES, RADIUS_AT_ONCE, RAYS
-from ...geometry.affine import affine, stack
+from ...budgets import GOAL_RAYS_COUNT, INWARD_BOXES, RADIUS_AT_ONCE
+from ...geometry.affine import make_affine, stack
 from ...geometry.vectors import Array
-from ...tolerances import FOLLOWED, INWARD_SHARES
+from ...tolerances import HIDDEN_ROBOT_RESIDUAL_TOL, INWARD_SHARES
 from .cones import ConeProver, proved_all_over
 from .pose_error import PoseError
 
@@ -43,7 +43,7 @@ class InwardProver:
     def core(self, radius: float) -> float:
         """The radius of a ball, at most ``radius``, in which |J⁺ (J − J̄)| < 1, J̄ the mean of J from the goal on: as
         d = (J − J̄) x, runs lead inwards there."""
-        least = np.linalg.svd(self.rates.Q, compute_uv=False)[-1] * (1 - FOLLOWED)
+        least = np.linalg.svd(self.rates.Q, compute_uv=False)[-1] * (1 - HIDDEN_ROBOT_RESIDUAL_TOL)
         while radius > 0:
             change, mean = self.rates.changes(radius)
             if 2 * change + mean < least:
@@ -55,7 +55,7 @@ class InwardProver:
         """Return True for boxes in which all legs reach, J has full rank and runs lead inwards; and the axes along
         which to cut the others."""
         n, count = middle.shape[1], len(middle)
-        x = [affine(middle[:, i], half[:, i, None] * np.eye(n)[i], np.zeros(count)) for i in range(n)]
+        x = [make_affine(middle[:, i], half[:, i, None] * np.eye(n)[i], np.zeros(count)) for i in range(n)]
         found, limbs = self.rates.jacobian.at(x), len(self.error.limbs)
         reached = np.ones(count, dtype=bool)
         for each in found[:limbs]:
@@ -67,12 +67,19 @@ class InwardProver:
         J, off = np.where(reached[:, None, None], J, 0.0), np.where(reached[:, None, None], off, 0.0)
         size = np.where(reached[:, None], d.size, 0.0)
         N = J.transpose(0, 2, 1) @ J
-        floor = FOLLOWED * np.trace(N, axis1=1, axis2=2)[:, None, None] + np.where(reached, 0.0, 1.0)[:, None, None]
+        floor = (
+            HIDDEN_ROBOT_RESIDUAL_TOL * np.trace(N, axis1=1, axis2=2)[:, None, None]
+            + np.where(reached, 0.0, 1.0)[:, None, None]
+        )
         P = np.linalg.inv(N + floor * np.eye(n))
         # P N = 1 + F, |F| ≤ f, for all J in the box
         change = np.abs(J).transpose(0, 2, 1) @ off
         change = change + change.transpose(0, 2, 1) + off.transpose(0, 2, 1) @ off
-        f = np.linalg.norm(np.abs(P @ N - np.eye(n)) + np.abs(P) @ change, axis=(1, 2)) * (1 + FOLLOWED) + FOLLOWED
+        f = (
+            np.linalg.norm(np.abs(P @ N - np.eye(n)) + np.abs(P) @ change, axis=(1, 2))
+            * (1 + HIDDEN_ROBOT_RESIDUAL_TOL)
+            + HIDDEN_ROBOT_RESIDUAL_TOL
+        )
         to = P @ J.transpose(0, 2, 1)
         with np.errstate(invalid="ignore"):  # of boxes that are not enclosed
             centre = np.where(reached[:, None], np.nan_to_num(np.einsum("cnr,cr->cn", to, d.v[0])), 0.0)
@@ -84,7 +91,7 @@ class InwardProver:
         along = np.sum(middle * centre + np.abs(middle) * spread + half * z, axis=1)
         near = np.linalg.norm(np.maximum(np.abs(middle) - half, 0.0), axis=1)
         doubt = doubt / np.where(f < 1, 1 - f, np.nan)
-        proved = reached & (near > doubt) & (near * (near - doubt) * (1 - FOLLOWED) > along)
+        proved = reached & (near > doubt) & (near * (near - doubt) * (1 - HIDDEN_ROBOT_RESIDUAL_TOL) > along)
         weights = np.linalg.norm(parts, axis=2).T + half * np.linalg.norm(z, axis=1)[:, None]
         weights = np.where(half > half.max(axis=1)[:, None] / 9, weights + 1e-9 * half, 0.0)
         return proved, np.argmax(weights, axis=1)
@@ -128,7 +135,7 @@ def _hold_inwards(prover: InwardProver, radius: float, core: float) -> tuple[boo
 def _seen_radius(error: PoseError, seed: int) -> float:
     """Return the largest radius at which rays from the goal show that runs lead inwards (not proved)."""
     n = error.size
-    w = np.random.default_rng(seed).normal(size=(RAYS, n))
+    w = np.random.default_rng(seed).normal(size=(GOAL_RAYS_COUNT, n))
     w /= np.linalg.norm(w, axis=1)[:, None]
     last = 0.0
     for t in np.geomspace(1e-2, 3.0, 80):

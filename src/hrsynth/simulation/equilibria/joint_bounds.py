@@ -12,7 +12,7 @@ import numpy as np
 from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
 from ...geometry.affine import AffineForms
 from ...geometry.vectors import Array
-from ...tolerances import BOX_ROUNDING
+from ...tolerances import BOX_EDGE_ROUNDING_TOL
 from .joint_error import JointError
 
 Bounds = tuple[Array, Array]
@@ -39,8 +39,8 @@ def narrow_joint(limb: ClosedFormLeg, along: Bounds, one: Bounds, two: Bounds, o
     shifts = [0.0] if isinstance(limb, OnRail) else list(2 * np.pi * np.arange(-2, 3))
     met = [
         (
-            np.maximum(own[0], a + shift - BOX_ROUNDING * (1 + np.abs(a))),
-            np.minimum(own[1], b + shift + BOX_ROUNDING * (1 + np.abs(b))),
+            np.maximum(own[0], a + shift - BOX_EDGE_ROUNDING_TOL * (1 + np.abs(a))),
+            np.minimum(own[1], b + shift + BOX_EDGE_ROUNDING_TOL * (1 + np.abs(b))),
         )
         for a, b in _places(limb, along, one, two)
         for shift in shifts
@@ -61,17 +61,17 @@ def _places(limb: ClosedFormLeg, along: Bounds, one: Bounds, two: Bounds) -> lis
         angle = _angle(one, two)
         if isinstance(limb, OnCrank):
             low, high = _square(along)
-            doubt = BOX_ROUNDING * (high + limb.radius**2 + limb.rod**2)
+            doubt = BOX_EDGE_ROUNDING_TOL * (high + limb.radius**2 + limb.rod**2)
             share = (
                 _share(low + limb.radius**2 - limb.rod**2 - doubt, far, limb.radius, least=True),
                 _share(high + limb.radius**2 - limb.rod**2 + doubt, far, limb.radius, least=False),
             )
             a, b = _turn(share[1]), _turn(share[0])
-            none = (share[0] > 1 + BOX_ROUNDING) | (share[1] < -1 - BOX_ROUNDING)
+            none = (share[0] > 1 + BOX_EDGE_ROUNDING_TOL) | (share[1] < -1 - BOX_EDGE_ROUNDING_TOL)
             a, b = np.where(none, np.nan, a), np.where(none, np.nan, b)
             return [(angle[0] + a, angle[1] + b), (angle[0] - b, angle[1] - a)]
         assert isinstance(limb, SlidingRod)
-        none = far[1] < abs(limb.aside) * (1 - BOX_ROUNDING)
+        none = far[1] < abs(limb.aside) * (1 - BOX_EDGE_ROUNDING_TOL)
         sides = [np.pi / 2 - _turn(limb.aside / np.maximum(each, 1e-300)) for each in far]
         a, b = np.where(none, np.nan, np.minimum(*sides)), np.maximum(*sides)
         return [(angle[0] - b, angle[1] - a), (angle[0] + a - np.pi, angle[1] + b - np.pi)]
@@ -84,7 +84,7 @@ def _square(x: Bounds) -> Bounds:
 
 def _root(low: Array, high: Array) -> Bounds:
     """Return the root of those that are not negative; NaN where all are."""
-    doubt = BOX_ROUNDING * (1 + np.abs(high))
+    doubt = BOX_EDGE_ROUNDING_TOL * (1 + np.abs(high))
     return np.sqrt(np.maximum(low - doubt, 0.0)), np.sqrt(high + doubt)
 
 
@@ -108,7 +108,7 @@ def _share(rest: Array, far: Bounds, radius: float, *, least: bool) -> Array:
     ends = [(rest + h * h) / (2 * radius * h) for h in far]
     if not least:
         found = np.maximum(*ends)
-        return np.asarray(np.where(np.isnan(found), np.inf, found) + BOX_ROUNDING)
+        return np.asarray(np.where(np.isnan(found), np.inf, found) + BOX_EDGE_ROUNDING_TOL)
     turn = np.sqrt(np.maximum(rest, 0.0))
     found = np.where((turn >= far[0]) & (turn <= far[1]) & (rest > 0), turn / radius, np.minimum(*ends))
-    return np.asarray(np.where(np.isnan(found), -np.inf, found) - BOX_ROUNDING)
+    return np.asarray(np.where(np.isnan(found), -np.inf, found) - BOX_EDGE_ROUNDING_TOL)

@@ -26,7 +26,7 @@ from ...batch.enclosures import BoxFormula, trace_formula
 from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
 from ...geometry.components import (
     Components,
-    combination,
+    combine_columns,
     cosine,
     cross,
     dot,
@@ -38,13 +38,13 @@ from ...geometry.components import (
     transform_vector,
 )
 from ...geometry.duals import Dual
-from ...geometry.so3 import exponential
+from ...geometry.so3 import convert_vectors_to_rotations
 from ...geometry.vectors import Array, hat
 from ...results import Value
-from ...tolerances import EXACT, FOLLOWED, KNOWN_NUMBER, SHORTEST_ROD
+from ...tolerances import EXACT_INCIDENCE_TOL, FILE_NUMBER_TOL, HIDDEN_ROBOT_RESIDUAL_TOL, SLIDING_ROD_LENGTH_MIN
 from .pose_error import Number, PoseError
 
-of_robot = partial(trace_formula, off=KNOWN_NUMBER)
+of_robot = partial(trace_formula, off=FILE_NUMBER_TOL)
 
 
 def rodless(error: PoseError) -> Array:
@@ -65,11 +65,13 @@ class JointError(Value):
     goal: PoseError
     far: int | None = None
     short: tuple[int, int] | None = None
-    shortest: float = SHORTEST_ROD
+    shortest: float = SLIDING_ROD_LENGTH_MIN
     square: int | None = None
 
     @classmethod
-    def of(cls, error: PoseError, goal: PoseError | None = None, shortest: float = SHORTEST_ROD) -> JointError:
+    def of(
+        cls, error: PoseError, goal: PoseError | None = None, shortest: float = SLIDING_ROD_LENGTH_MIN
+    ) -> JointError:
         """Build the error about the goal; a sliding rod in a plane rotates about the plane's normal."""
         limbs = tuple(_in_plane(error, limb) for limb in error.limbs)
         joints = tuple(
@@ -95,7 +97,7 @@ class JointError(Value):
         )
 
     @property
-    def endless(self) -> bool:
+    def is_unbounded(self) -> bool:
         """Return True if these hold all poses, arbitrarily distant ones included."""
         return len(self.charts) > 1
 
@@ -168,7 +170,10 @@ class JointError(Value):
                 ways = limb.axis @ error.shifts
                 middle = limb.axis @ (error.p + limb.tip.constant - limb.centre) + ways @ (low[:k] + high[:k]) / 2
                 room = limb.rod + np.linalg.norm(limb.tip.turned) + np.abs(ways) @ (high[:k] - low[:k]) / 2
-                low[place], high[place] = middle - room - FOLLOWED, middle + room + FOLLOWED
+                low[place], high[place] = (
+                    middle - room - HIDDEN_ROBOT_RESIDUAL_TOL,
+                    middle + room + HIDDEN_ROBOT_RESIDUAL_TOL,
+                )
         return low, high
 
     def near(self, y: Array) -> Array:
@@ -202,7 +207,7 @@ class JointError(Value):
     def pose(self, y: Array) -> tuple[Array, Array]:
         """The platform's point (c, 3), in characteristic lengths, and rotation (c, 3, 3) at coordinates (c, n)."""
         y, k = self.near(y), self.error.shifts.shape[1]
-        turn = exponential(y[:, k : self.error.size] @ self.error.turns.T)
+        turn = convert_vectors_to_rotations(y[:, k : self.error.size] @ self.error.turns.T)
         return self.error.p + y[:, :k] @ self.error.shifts.T, turn @ self.error.R
 
     def unknowns(self, y: Sequence[Any], places: Iterable[int]) -> list[Dual]:
@@ -273,7 +278,7 @@ class JointError(Value):
         w, place = number(1.0), list(x[:k])
         if self.far is not None:
             w, place[self.far] = x[self.far], w
-        point, u = combination(place, self.error.shifts, number), list[Dual]()
+        point, u = combine_columns(place, self.error.shifts, number), list[Dual]()
         if self.short is not None:
             v = [x[1], x[2]]
             v.insert(self.short[1], w)
@@ -391,7 +396,9 @@ class JointError(Value):
         axis, found = self.error.R.T @ self.error.turns[:, 0], list[tuple[int, list[int]]]()
         tips = [each.tip.turned for each in self.error.limbs]
         for i, tip in enumerate(tips):
-            rest = [k for k, other in enumerate(tips) if np.abs(np.cross(axis, other - tip)).max() > EXACT]
+            rest = [
+                k for k, other in enumerate(tips) if np.abs(np.cross(axis, other - tip)).max() > EXACT_INCIDENCE_TOL
+            ]
             if rest and rest not in [each for _, each in found]:
                 found.append((i, rest))
         return found
@@ -484,4 +491,4 @@ def _in_plane(error: PoseError, limb: ClosedFormLeg) -> ClosedFormLeg:
         normal @ (error.p + limb.tip.constant + error.R @ limb.tip.turned - limb.centre),
         *(np.cross(normal, error.turns.T).ravel()),
     ]
-    return limb if np.abs(off).max() > FOLLOWED else replace(limb, axis=normal)
+    return limb if np.abs(off).max() > HIDDEN_ROBOT_RESIDUAL_TOL else replace(limb, axis=normal)

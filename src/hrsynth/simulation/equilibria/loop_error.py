@@ -24,14 +24,19 @@ from ...closed_forms.legs import OnCrank, OnRail, SlidingRod
 from ...geometry.affine import AffineForms, stack
 from ...geometry.components import Components, cosine, cross, dot, minus, plus, scale, sine
 from ...geometry.vectors import Array
-from ...tolerances import EXACT, FOLLOWED, MET_AGAIN, SMALLEST_BOX
+from ...tolerances import (
+    CRITICAL_BOX_HALF_EDGE_MIN,
+    EXACT_INCIDENCE_TOL,
+    HIDDEN_ROBOT_RESIDUAL_TOL,
+    POSE_BOX_MIN_FRACTION,
+)
 from .elimination import Flags, Places, away, pivots
 from .joint_bounds import narrow_joint as joint_bounds
 from .joint_error import JointError, across, of_robot
-from .pose_error import NotEnclosed, Number, PoseError
+from .pose_error import EnclosureFailure, Number, PoseError
 from .subdivision import CriticalBox, Subdivision, forms_of, hull
 
-NARROWINGS = 16
+ZERO_NARROWINGS_COUNT = 16
 """Number of times that the place of a zero is narrowed."""
 
 
@@ -61,17 +66,17 @@ class LoopError(JointError):
 
     @classmethod
     def about(cls, error: PoseError) -> LoopError:
-        """Build the equations of a pose's error; raises ``NotEnclosed`` if it is not that of such a loop."""
+        """Build the equations of a pose's error; raises ``EnclosureFailure`` if it is not that of such a loop."""
         joints = tuple(each.limb for each in error.seen if each.limb is not None)
         if (
             len(error.seen) != 2
             or len(set(joints)) != 2
             or not all(isinstance(error.limbs[i], OnCrank | OnRail) for i in joints)
         ):
-            raise NotEnclosed("the observed legs are not two rods of constant length")
+            raise EnclosureFailure("the observed legs are not two rods of constant length")
         found = cls(error, joints, error, shortest=0.0)
-        if error.turns.shape[1] > 1 or any(abs(each.size) < EXACT for each in found.terms):
-            raise NotEnclosed("the observed legs do not determine the platform's rotation")
+        if error.turns.shape[1] > 1 or any(abs(each.size) < EXACT_INCIDENCE_TOL for each in found.terms):
+            raise EnclosureFailure("the observed legs do not determine the platform's rotation")
         if error.shifts.shape[1] == 2:
             normal = np.cross(*error.shifts.T)
             off = [
@@ -81,8 +86,10 @@ class LoopError(JointError):
                     for each in found.terms
                 ),
             ]
-        if error.shifts.shape[1] not in (2, 3) or (error.shifts.shape[1] == 2 and np.abs(off).max() > FOLLOWED):
-            raise NotEnclosed("the motion is neither planar nor spatial")
+        if error.shifts.shape[1] not in (2, 3) or (
+            error.shifts.shape[1] == 2 and np.abs(off).max() > HIDDEN_ROBOT_RESIDUAL_TOL
+        ):
+            raise EnclosureFailure("the motion is neither planar nor spatial")
         return found
 
     @cached_property
@@ -305,14 +312,18 @@ class LoopSubdivision(Subdivision):
         room = np.maximum(high - y, y - low)
         for k in range(len(x)):
             apart = np.abs(y[kept] - y[k])
-            if not np.any(np.all(np.minimum(apart, np.abs(over.periods - apart)) + room[k] < MET_AGAIN, axis=1)):
+            if not np.any(
+                np.all(np.minimum(apart, np.abs(over.periods - apart)) + room[k] < CRITICAL_BOX_HALF_EDGE_MIN, axis=1)
+            ):
                 kept.append(k)
         x, reach, y, room = (each[kept] for each in (x, reach, y, room))
         # as wide as the smallest boxes are to be in which a zero nearby is sought
-        whole = np.full(y.shape[1], max(1.0, float(room.max()) / SMALLEST_BOX))
+        whole = np.full(y.shape[1], max(1.0, float(room.max()) / POSE_BOX_MIN_FRACTION))
         part = Subdivision(over, -whole, whole)
         P = pivots(part._values(forms_of(y, 0 * y))[1].v[0])[0]
-        settled = np.all(room < MET_AGAIN, axis=1) & part._unique(y, np.full(y.shape, MET_AGAIN), P, 1.0)
+        settled = np.all(room < CRITICAL_BOX_HALF_EDGE_MIN, axis=1) & part._unique(
+            y, np.full(y.shape, CRITICAL_BOX_HALF_EDGE_MIN), P, 1.0
+        )
         rest = np.flatnonzero(~settled)
         if len(rest):
             settled[rest] = part._near_zero(y[rest], room[rest], P[rest])
@@ -332,6 +343,6 @@ class LoopSubdivision(Subdivision):
         bound is narrowed from the whole box."""
         at, room, frame = self._rooms()
         reach = hull(room, frame) + np.abs(x - at)
-        for _ in range(NARROWINGS):
+        for _ in range(ZERO_NARROWINGS_COUNT):
             reach = np.fmin(reach, self._krawczyk(x, reach)[1])
         return reach

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...geometry.vectors import Array, pose_difference
+from ...geometry.vectors import Array, compare_poses
 from ...results import Value
-from ...tolerances import RUNS_ALIKE
+from ...tolerances import RUN_END_DIFFERENCE_TOL
 from ..outcome import BOUNDARY, RunOutcome
 from .attraction_radius import CertifiedRadius
 from .flow import Flags, Places
@@ -22,7 +22,7 @@ class Outcome(Value):
     X: Array | None = None
     size: float = np.inf
 
-    def alike(self, other: Outcome, length: float) -> bool:
+    def is_same_outcome(self, other: Outcome, length: float) -> bool:
         """Return True if two runs have the same outcome: one pose, or one reason."""
         if self.X is None or other.X is None or self.ending.name != other.ending.name:
             said = [
@@ -30,7 +30,7 @@ class Outcome(Value):
                 for each in (self, other)
             ]
             return said[0] == said[1]
-        return pose_difference(self.X, other.X, length) <= RUNS_ALIKE
+        return compare_poses(self.X, other.X, length) <= RUN_END_DIFFERENCE_TOL
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class Outcomes:
     def number(self, outcome: Outcome) -> int:
         """The number of an outcome, a new one if need be."""
         for number, each in enumerate(self.all):
-            if each.alike(outcome, self.length):
+            if each.is_same_outcome(outcome, self.length):
                 return number
         self.all.append(outcome)
         return len(self.all) - 1

@@ -25,18 +25,18 @@ from ...analysis.aspects.vector_expressions import NoLegForm
 from ...analysis.observed import ObservedRobot
 from ...batch.enclosures import BoxFormula, trace_formula
 from ...closed_forms.legs import SlidingRod
-from ...geometry.affine import affine, stack
-from ...geometry.components import Components, combination, cross, plus, scale
+from ...geometry.affine import make_affine, stack
+from ...geometry.components import Components, combine_columns, cross, plus, scale
 from ...geometry.duals import Dual
-from ...geometry.so3 import quaternions
+from ...geometry.so3 import convert_to_quaternions
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...mechanism import JointType, Mechanism
 from ...mechanism.legs import Leg
-from ...tolerances import AFFINE_ROUNDING, EXACT, FOLLOWED, SAME_ENDING
+from ...tolerances import AFFINE_ROUNDING, CRITICAL_POINT_DISTANCE_TOL, EXACT_INCIDENCE_TOL, HIDDEN_ROBOT_RESIDUAL_TOL
 from .joint_error import JointError, total
-from .pose_error import NotEnclosed, Number, PoseError, require_directions
+from .pose_error import EnclosureFailure, Number, PoseError, require_directions
 from .pose_system import bends
 
 
@@ -57,14 +57,14 @@ class PlaneError(JointError):
 
     @classmethod
     def families(cls, setup: ObservedRobot, goal: ClosedConfiguration) -> list[PlaneError]:
-        """Return the errors of all families of poses of such a platform; raises ``NotEnclosed``."""
+        """Return the errors of all families of poses of such a platform; raises ``EnclosureFailure``."""
         require_directions(setup)
         configurations, observation_model = (
             [setup.all_samples.start, *setup.configurations],
             setup.samples.observation_model,
         )
         motion = PlatformMotion.of(configurations, replace(observation_model, observations=()))
-        depends = NotEnclosed("the variable parts of the platform's pose depend on each other")
+        depends = EnclosureFailure("the variable parts of the platform's pose depend on each other")
         legs = setup.decomposition.legs
         normals = [_normal(setup.mechanism, leg) for leg in legs]
         if not motion.body or motion.twists.shape[1] < 6 or any(normal is None for normal in normals):
@@ -73,14 +73,14 @@ class PlaneError(JointError):
         try:
             error = PoseError.along(setup, goal, coordinates)
         except NoLegForm as why:
-            raise NotEnclosed(str(why)) from why
+            raise EnclosureFailure(str(why)) from why
         if [str(limb.label) for limb in error.limbs] != [leg.label for leg in legs] or not all(
             isinstance(limb, SlidingRod) for limb in error.limbs
         ):
             raise depends
         N, places = np.array(normals), coordinates.of([goal, *configurations])
         h = [limb.tip.value(*places) @ n for limb, n in zip(error.limbs, N, strict=True)]
-        if max(map(np.ptp, h)) > FOLLOWED:
+        if max(map(np.ptp, h)) > HIDDEN_ROBOT_RESIDUAL_TOL:
             raise depends
         limbs = tuple(
             replace(limb, axis=n) if isinstance(limb, SlidingRod) and limb.axis is None else limb
@@ -92,7 +92,7 @@ class PlaneError(JointError):
         rest = np.array([each[0] - n @ limb.tip.constant for each, n, limb in zip(h, N, limbs, strict=True)])
         arms = np.array([np.outer(n, limb.tip.turned).ravel() for n, limb in zip(N, limbs, strict=True)])
         U, sizes, V = np.linalg.svd(N)
-        rank, back = int(np.sum(sizes > EXACT)), np.linalg.pinv(N, rcond=EXACT)
+        rank, back = int(np.sum(sizes > EXACT_INCIDENCE_TOL)), np.linalg.pinv(N, rcond=EXACT_INCIDENCE_TOL)
         along, follow = V[rank:].T, -back @ arms
         offset = back @ rest - error.p
         offset -= along @ (along.T @ offset)
@@ -123,10 +123,10 @@ class PlaneError(JointError):
     def list_charts(self, bounded: bool) -> tuple[JointError, ...]:
         return self.charts
 
-    def holds(self, R: Array) -> bool:
+    def has_rotation(self, R: Array) -> bool:
         """Return True if a rotation is in the family, up to the tolerance of equal rotations."""
-        q = quaternions(R)
-        return bool(np.abs(q - self.span @ (self.span.T @ q)).max() < SAME_ENDING)
+        q = convert_to_quaternions(R)
+        return bool(np.abs(q - self.span @ (self.span.T @ q)).max() < CRITICAL_POINT_DISTANCE_TOL)
 
     @property
     def ends(self) -> Array:
@@ -163,8 +163,8 @@ class PlaneError(JointError):
         if self.far is not None:
             w, place[self.far] = x[self.far], w
         turned = [self._times(w, each) for each in self._rotation(x[k:], number)]
-        point = plus(scale(w, number(self.offset)), combination(turned, self.follow, number))
-        return w, plus(point, combination(place, self.along, number)) if k else point, turned, []
+        point = plus(scale(w, number(self.offset)), combine_columns(turned, self.follow, number))
+        return w, plus(point, combine_columns(place, self.along, number)) if k else point, turned, []
 
     def _times(self, w: Dual, turned: Dual) -> Dual:
         """w times what turns alone decide; far away with rates by these over w."""
@@ -224,7 +224,7 @@ class PlaneError(JointError):
         """Return shifts from the goal, axes of the rotation times its sine, and joints of boxes (c, n)."""
         f, eye = self.freedoms, np.eye(self.freedoms)
         forms = [
-            affine(middle[:, i], half[:, i, None] * eye[i], AFFINE_ROUNDING * (1 + np.abs(middle[:, i])))
+            make_affine(middle[:, i], half[:, i, None] * eye[i], AFFINE_ROUNDING * (1 + np.abs(middle[:, i])))
             for i in range(f)
         ]
         w, *rest = self.told.at(forms)
@@ -265,13 +265,13 @@ TURNED = np.stack([bends(each, np.eye(3)) for each in np.eye(3)], axis=1).reshap
 
 def factors(span: Array, forms: Sequence[Array]) -> Iterator[tuple[Array, list[Array]]]:
     """Spaces (4, r) of quaternions in whose union forms vanish, each with the forms that do not vanish all over it;
-    raises ``NotEnclosed`` where one vanishes with its slope."""
+    raises ``EnclosureFailure`` where one vanishes with its slope."""
     if not forms:
         yield span, []
         return
     first, *rest = forms
     values, vectors = np.linalg.eigh(span.T @ first @ span)
-    large = np.abs(values) > EXACT
+    large = np.abs(values) > EXACT_INCIDENCE_TOL
     if not large.any():
         yield from factors(span, rest)
     elif large.sum() == 2 and values[large].prod() < 0:
@@ -281,7 +281,7 @@ def factors(span: Array, forms: Sequence[Array]) -> Iterator[tuple[Array, list[A
     elif values[large].min() < 0 < values[large].max():
         yield from ((own, [first, *left]) for own, left in factors(span, rest))
     elif not large.all():
-        raise NotEnclosed("planes of legs are tangent to each other at some poses")
+        raise EnclosureFailure("planes of legs are tangent to each other at some poses")
 
 
 def _normal(mechanism: Mechanism, leg: Leg) -> Array | None:
@@ -300,4 +300,4 @@ def _normal(mechanism: Mechanism, leg: Leg) -> Array | None:
         return None
     normal = turns[0].axis
     off = [*(np.cross(normal, each.axis) for each in turns), *(np.array([normal @ each.axis]) for each in slides)]
-    return None if max(np.abs(each).max() for each in off) > EXACT else normal
+    return None if max(np.abs(each).max() for each in off) > EXACT_INCIDENCE_TOL else normal

@@ -17,17 +17,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...analysis.aspects.leg_forms import LegPattern, pattern
-from ...analysis.aspects.path_segments import PathCoordinates, path_coordinates
+from ...analysis.aspects.leg_forms import LegPattern, build_leg_pattern
+from ...analysis.aspects.path_segments import PathCoordinates, list_path_coordinates
 from ...analysis.aspects.vector_expressions import JointRules, NoLegForm
 from ...analysis.observed import ObservedRobot
 from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, OnRod, SlidingRod
 from ...closed_forms.platform_points import PlatformPoint, platform_point
-from ...constraints.named_vectors import BodyVector, NamedVector, poses_at
+from ...constraints.named_vectors import BodyVector, NamedVector, collect_poses
 from ...geometry.components import (
     Components,
     cayley,
-    combination,
+    combine_columns,
     cross,
     dot,
     minus,
@@ -43,7 +43,7 @@ from ...kinematics.platform_motion import PlatformMotion
 from ...mechanism.observation import Observation
 from ...mechanism.observations.direction import Direction
 from ...results import Value
-from ...tolerances import EXACT, FOLLOWED
+from ...tolerances import EXACT_INCIDENCE_TOL, HIDDEN_ROBOT_RESIDUAL_TOL
 
 Number = Callable[[Any], Any]
 Place = tuple[Components, Components]
@@ -63,7 +63,7 @@ class Twist:
     w: Components | None
 
 
-class NotEnclosed(Exception):
+class EnclosureFailure(Exception):
     """Reason why the error has no enclosure over poses."""
 
 
@@ -78,7 +78,7 @@ class ObservedDirection(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class Turning:
+class RotatingDirection:
     """An observed direction u, the one that is wanted, and u̇ along some directions of the coordinates: ``plain``[j] −
     ``normal``[j] ``slip`` / ``along``, which vanishes at the leg's limit."""
 
@@ -108,7 +108,7 @@ class ErrorRates:
     """At poses: the legs' reach margins, and what the observed directions do."""
 
     margins: Sequence[Any]
-    seen: Sequence[Turning]
+    seen: Sequence[RotatingDirection]
 
     @property
     def E(self) -> Any:
@@ -139,31 +139,33 @@ class PoseError(Value):
 
     @classmethod
     def of(cls, setup: ObservedRobot, goal: ClosedConfiguration) -> PoseError:
-        """Build the error of the observations about a configuration; raises ``NotEnclosed``."""
+        """Build the error of the observations about a configuration; raises ``EnclosureFailure``."""
         require_directions(setup)
         configurations = [setup.all_samples.start, *setup.configurations]
         reason = "the variable parts of the platform's pose depend on each other"
-        for each in path_coordinates(setup.decomposition, setup.samples.observation_model, setup.dof, configurations):
+        for each in list_path_coordinates(
+            setup.decomposition, setup.samples.observation_model, setup.dof, configurations
+        ):
             try:
                 return cls.along(setup, goal, each)
             except NoLegForm as why:
                 reason = str(why)
-        raise NotEnclosed(reason)
+        raise EnclosureFailure(reason)
 
     @classmethod
     def along(cls, setup: ObservedRobot, goal: ClosedConfiguration, coordinates: PathCoordinates) -> PoseError:
-        """Build the error over the variable part of the platform's pose; raises ``NotEnclosed``, or ``NoLegForm`` if a
-        leg has none."""
+        """Build the error over the variable part of the platform's pose; raises ``EnclosureFailure``, or ``NoLegForm``
+        if a leg has none."""
         configurations, mechanism = [setup.all_samples.start, *setup.configurations], setup.mechanism
         motion = coordinates.motion
-        known = pattern(setup.decomposition, [], coordinates, configurations)
+        known = build_leg_pattern(setup.decomposition, [], coordinates, configurations)
         # a leg on whose rail the point itself lies gives no condition: the point's one shift is along the rail
         pairs = [
             (limb, carried)
             for limb, carried in zip(known.forms(goal).subchains, known.carried, strict=True)
             if not (
                 isinstance(limb, OnRail)
-                and limb.rod <= EXACT
+                and limb.rod <= EXACT_INCIDENCE_TOL
                 and motion.translations.shape[1] == 1
                 and not np.any(limb.tip.turned)
             )
@@ -195,10 +197,10 @@ class PoseError(Value):
         """p (3) and R (9, by rows) at coordinates x."""
         k, R = self.shifts.shape[1], number(self.R.ravel())
         if self.turns.shape[1]:
-            gamma = combination(x[k:], self.turns, number)
+            gamma = combine_columns(x[k:], self.turns, number)
             columns = [cayley(gamma, [R[3 * i + j] for i in range(3)]) for j in range(3)]
             R = [columns[j][i] for i in range(3) for j in range(3)]
-        return plus(number(self.p), combination(x[:k], self.shifts, number)), R
+        return plus(number(self.p), combine_columns(x[:k], self.shifts, number)), R
 
     @property
     def mirrors(self) -> Array:
@@ -246,9 +248,9 @@ class PoseError(Value):
         k = self.shifts.shape[1]
         w: Components | None = None
         if self.turns.shape[1]:
-            gamma, rate = (combination(each[k:], self.turns, number) for each in (x, rates))
+            gamma, rate = (combine_columns(each[k:], self.turns, number) for each in (x, rates))
             w = spin(gamma, rate, self.turns.shape[1] == 1)
-        return Twist(combination(rates[:k], self.shifts, number), w)
+        return Twist(combine_columns(rates[:k], self.shifts, number), w)
 
     def _tip(self, limb: ClosedFormLeg, p: Components, R: Components, number: Number) -> tuple[Components, Components]:
         """Return a leg's tip, and the tip relative to the point."""
@@ -257,12 +259,12 @@ class PoseError(Value):
 
     def _turning(
         self, seen: ObservedDirection, here: Place, goal: Place, twists: Sequence[Twist], number: Number
-    ) -> Turning:
+    ) -> RotatingDirection:
         """An observed direction, and how it changes with twists of the platform's point."""
         wanted, u = self._direction(seen, *goal, number), self._direction(seen, *here, number)
         if seen.limb is None:
             plain = [[0.0, 0.0, 0.0] if each.w is None else cross(each.w, u) for each in twists]
-            return Turning(u, wanted, plain, [0.0] * len(twists), u, 1.0)
+            return RotatingDirection(u, wanted, plain, [0.0] * len(twists), u, 1.0)
         limb = self.limbs[seen.limb]
         tip, arm = self._tip(limb, *here, number)
         margin, carried = limb.at(tip, number, limb.mode)
@@ -274,7 +276,9 @@ class PoseError(Value):
             along = (-limb.mode) * (gain * sqrt(margin))
         else:
             gain, slip, along = (seen.sense * limb.mode) / sqrt(margin), u, 1.0
-        return Turning(u, wanted, [scale(gain, y) for y in tips], [gain * dot(u, y) for y in tips], slip, along)
+        return RotatingDirection(
+            u, wanted, [scale(gain, y) for y in tips], [gain * dot(u, y) for y in tips], slip, along
+        )
 
     def _direction(self, seen: ObservedDirection, p: Components, R: Components, number: Number) -> Components:
         """Return an observed direction at a pose, in its leg's working mode."""
@@ -292,15 +296,15 @@ class PoseError(Value):
 
 
 def require_directions(setup: ObservedRobot) -> None:
-    """Raise ``NotEnclosed`` unless directions are measured from the base."""
+    """Raise ``EnclosureFailure`` unless directions are measured from the base."""
     mechanism = setup.mechanism
     others = [each for each in setup.observed if not isinstance(each, Direction)]
     if others:
-        raise NotEnclosed(f"the observation of leg {others[0].leg} is not a direction")
+        raise EnclosureFailure(f"the observation of leg {others[0].leg} is not a direction")
     if mechanism.reference != mechanism.base or any(each.seen_from is not None for each in setup.observed):
-        raise NotEnclosed("directions are not measured from the base")
+        raise EnclosureFailure("directions are not measured from the base")
     if mechanism.couplings:
-        raise NotEnclosed("joints are coupled")
+        raise EnclosureFailure("joints are coupled")
 
 
 def _seen_direction(
@@ -310,25 +314,25 @@ def _seen_direction(
     read: JointRules,
     configurations: Sequence[ClosedConfiguration],
 ) -> ObservedDirection:
-    """Return the leg whose rod has an observed direction at all configurations; raises ``NotEnclosed``."""
+    """Return the leg whose rod has an observed direction at all configurations; raises ``EnclosureFailure``."""
     assert isinstance(observation, Direction)
     feature = BodyVector("u", "observed", observation.link, observation.direction)
-    u = feature.value(poses_at(configurations, feature.links))
+    u = feature.value(collect_poses(configurations, feature.links))
     p, R = known.coordinates.of(configurations)
     for i, (limb, carried) in enumerate(pairs):
         if not isinstance(limb, OnRod | SlidingRod):
             continue
-        held = carried.value(poses_at(configurations, carried.links))
+        held = carried.value(collect_poses(configurations, carried.links))
         rods = (limb.tip.value(p, R) - held) / limb.rod if isinstance(limb, OnRod) else held
         for sense in (1.0, -1.0):
-            if np.max(np.abs(u - sense * rods)) < FOLLOWED:
+            if np.max(np.abs(u - sense * rods)) < HIDDEN_ROBOT_RESIDUAL_TOL:
                 return ObservedDirection(observation.leg, sense, i)
     rule = read.rule(feature) or platform_point(u, p, R)
     if rule is not None and not rule.follows:
         # what does not turn with the platform is the same everywhere
         if known.coordinates.turning and np.any(rule.turned) and np.any(rule.constant):
-            raise NotEnclosed(f"the direction of link {observation.link} rotates partly with the platform")
+            raise EnclosureFailure(f"the direction of link {observation.link} rotates partly with the platform")
         return ObservedDirection(observation.leg, 1.0, None, rule)
-    raise NotEnclosed(
+    raise EnclosureFailure(
         f"the direction of link {observation.link} of leg {observation.leg} is not that of a rod in closed form"
     )

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRod, SlidingRod
 from ...geometry.vectors import Array, hat
 from ...results import Value
-from ...tolerances import SAME_ENDING
+from ...tolerances import CRITICAL_POINT_DISTANCE_TOL
 from .pose_error import ObservedDirection, PoseError
 
 
@@ -55,9 +55,9 @@ class Piece(Value):
     wanted: Array
 
     @property
-    def free(self) -> bool:
+    def is_free_rod(self) -> bool:
         """Return True if it is a rod with its own length and direction."""
-        return self.held and self.limb is not None and unbound(self.limb)
+        return self.held and self.limb is not None and is_free_sliding_rod(self.limb)
 
     def own(self, y: Array) -> Array:
         """Coordinates of the leg (c, j)."""
@@ -94,7 +94,7 @@ class Piece(Value):
             return t
         if isinstance(limb, OnRod):
             return sense / limb.rod * (t - self.start(o)[0])
-        if self.free:
+        if self.is_free_rod:
             return sense * o[:, 1:]
         if self.place is not None:
             return sense * self.ring(o)[0]
@@ -113,7 +113,7 @@ class Piece(Value):
             k = sense / limb.rod
             _, rate, bend = self.start(o)
             return LocalDerivatives(c, k * w + 0 * t, -k * (rate @ w), None, None, -k * (bend @ w))
-        if self.free:
+        if self.is_free_rod:
             return LocalDerivatives(c, 0 * t, sense * np.append(0.0, w) + 0 * o, None, None, np.zeros((4, 4)))
         if self.place is not None:
             return LocalDerivatives(c, 0 * t, sense * (self.ring(o)[1] @ w), None, None, -c)
@@ -132,7 +132,7 @@ class Piece(Value):
         limb = self.limb
         if self.place is None:
             return []
-        if self.free:
+        if self.is_free_rod:
             assert limb is not None
             s, u, eye = o[:, :1], o[:, 1:], np.eye(4)
             found = [
@@ -172,7 +172,7 @@ class Piece(Value):
         return found
 
 
-def unbound(limb: ClosedFormLeg) -> bool:
+def is_free_sliding_rod(limb: ClosedFormLeg) -> bool:
     """Return True if it is a rod that slides through a base point and rotates freely."""
     return isinstance(limb, SlidingRod) and limb.axis is None
 
@@ -205,8 +205,8 @@ class LegSystem(Value):
             limb = None if i is None else error.limbs[i]
             point = seen.rule if limb is None and seen is not None else limb.tip if limb is not None else None
             assert point is not None
-            free = i in held and limb is not None and unbound(limb)
-            joint = 4 if free else int(limb is not None and not unbound(limb))
+            free = i in held and limb is not None and is_free_sliding_rod(limb)
+            joint = 4 if free else int(limb is not None and not is_free_sliding_rod(limb))
             wanted = np.zeros(3) if seen is None else np.array(error._direction(seen, *goal, lambda value: value))
             pieces.append(
                 Piece(
@@ -229,14 +229,14 @@ class LegSystem(Value):
     @cached_property
     def holding(self) -> list[int]:
         """The lengths of held rods: without a multiplier such a leg holds nothing."""
-        counts = [4 if each.free else (each.place is not None) + each.held for each in self.pieces]
+        counts = [4 if each.is_free_rod else (each.place is not None) + each.held for each in self.pieces]
         ends = np.cumsum(counts) + (self.quaternion.stop > self.quaternion.start)
-        return [int(end) - 2 for each, end in zip(self.pieces, ends, strict=True) if each.held and not each.free]
+        return [int(end) - 2 for each, end in zip(self.pieces, ends, strict=True) if each.held and not each.is_free_rod]
 
     @property
     def free(self) -> list[Piece]:
         """The rods with a length and a direction of their own."""
-        return [each for each in self.pieces if each.free]
+        return [each for each in self.pieces if each.is_free_rod]
 
     @cached_property
     def wanted(self) -> Array:
@@ -282,8 +282,8 @@ class LegSystem(Value):
         (c,)."""
         error, good = self.error, np.ones(len(y), dtype=bool)
         for piece in self.pieces:
-            if piece.held and not piece.free:
-                good &= np.abs(piece.equations(self.tip(piece, y), piece.own(y))[1].o) > SAME_ENDING
+            if piece.held and not piece.is_free_rod:
+                good &= np.abs(piece.equations(self.tip(piece, y), piece.own(y))[1].o) > CRITICAL_POINT_DISTANCE_TOL
         own = {id(each.limb) for each in self.pieces if each.place is not None}
         p, R = self.point(y), self.rotation(y)
         for limb in error.limbs:
@@ -324,7 +324,7 @@ class LegSystem(Value):
             assert limb is not None
             assert piece.place is not None
             way = tip - limb.centre
-            if piece.free:
+            if piece.is_free_rod:
                 # any direction: where the rod is short, the way is soon along it
                 u = rng.normal(size=way.shape)
                 u /= np.linalg.norm(u, axis=1)[:, None]

@@ -14,40 +14,45 @@ from ...analysis.branch.carried_vectors import SweptChains
 from ...analysis.observed import ObservedRobot, restrict_samples
 from ...budgets import (
     ENDING_DESCENTS,
-    ENDING_EFFORT,
-    ENDING_LATE,
-    ENDING_LATE_DESCENT,
     ENDING_LEAST,
-    ENDING_ROUNDS,
-    ENDING_STARTS,
-    ENDING_WALK,
-    FARTHEST_ENDING,
-    POSE_WALKS,
+    EQUILIBRIUM_COORDINATE_MAX,
+    EQUILIBRIUM_COORDINATES_MAX,
+    EQUILIBRIUM_ROUNDS_MAX,
+    EQUILIBRIUM_STARTS_COUNT,
+    EQUILIBRIUM_WALK_STEPS_COUNT,
+    JOINT_ROUNDS_FRACTION,
+    LATE_EQUILIBRIA_FRACTION,
+    LATE_STABLE_EQUILIBRIA_FRACTION,
 )
-from ...constraints.pattern import placing_links
-from ...errors import LoopsNotClosed
+from ...constraints.pattern import list_placing_links
+from ...errors import LoopClosureFailure
 from ...geometry.vectors import Array, times
-from ...kinematics.assembly import of_links
+from ...kinematics.assembly import build_from_link_poses
 from ...kinematics.branch_tests import Signature
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.limits import outside
-from ...kinematics.velocity_relation import relation
+from ...kinematics.limits import list_joints_beyond
+from ...kinematics.velocity_relation import compute_relation
 from ...mechanism.observation import Observation
 from ...mechanism.observations.direction import SeenAxis
 from ...progress import report
 from ...results import Value
-from ...tolerances import CLOSURES_MEET, CRITICAL_FLAT, SAME_ENDING, SEEN_ABOVE
+from ...tolerances import (
+    CLOSURE_CROSSING_VALUE_TOL,
+    CRITICAL_CURVATURE_TOL,
+    CRITICAL_POINT_DISTANCE_TOL,
+    VISIBLE_SINE_MIN,
+)
 from ..law import Law
 from .descent import CriticalPoint, are_closed, close_loops, descend, walk_at_random
 from .error import CriticalPointEquations, DirectionTerm, ErrorSystem
 
-BESIDE = 0.5
+NEARBY_STARTS_FRACTION = 0.5
 """Factor for the number of starts a few random steps beside equilibria already found, if there are no closed forms."""
-WIDEST_SLIDE = 2.5
+PRISMATIC_START_MAX = 2.5
 """Coordinate of a slide (characteristic lengths) up to which one is drawn, or farther where its limits are."""
-SLIDE_STEPS = 3
+PRISMATIC_NEWTON_STEPS_COUNT = 3
 """Gauss and Newton's steps of slides alone: one does where the equations are linear in these."""
-FAMILY_TRIES = 8
+FAMILY_POINTS_MAX = 8
 """Largest number of points of one continuous family, of which one must lie in the operation mode of the zero
 configuration."""
 
@@ -92,13 +97,13 @@ def starts(system: ErrorSystem, homes: Array, seed: int = 0, setup: ObservedRobo
     rng = np.random.default_rng(seed)
     strict = False
     if setup is not None:
-        drawn = anywhere(system, rng, ENDING_STARTS)
+        drawn = anywhere(system, rng, EQUILIBRIUM_STARTS_COUNT)
         good, kept = in_mode(system, setup, drawn), in_mode(system, setup, homes)
         kept[0] = True
         homes, strict = np.concatenate([homes[kept], drawn[good]]), not (good.all() and kept.all())
-    q = homes[np.arange(ENDING_STARTS) % len(homes)]
+    q = homes[np.arange(EQUILIBRIUM_STARTS_COUNT) % len(homes)]
     while True:
-        q = walk_at_random(system, q, rng, ENDING_WALK)
+        q = walk_at_random(system, q, rng, EQUILIBRIUM_WALK_STEPS_COUNT)
         if strict and setup is not None:
             astray = ~in_mode(system, setup, q)
             q[astray] = homes[rng.integers(len(homes), size=int(astray.sum()))]
@@ -126,18 +131,18 @@ def critical_points(
     rng = np.random.default_rng([seed, 1])
     known = DistinctPoints(system, setup)
     fresh: list[int] = []
-    farthest = FARTHEST_ENDING + float(reaches(system).max(initial=0.0))
+    farthest = EQUILIBRIUM_COORDINATE_MAX + float(reaches(system).max(initial=0.0))
     points = descend(system, homes[:1], np.zeros(1, dtype=np.intp), idle, farthest)
-    most = max(ENDING_ROUNDS, ENDING_EFFORT // system.size[0])
+    most = max(EQUILIBRIUM_ROUNDS_MAX, EQUILIBRIUM_COORDINATES_MAX // system.size[0])
     met = [homes]
     lies_near = not minima and further is None and all(isinstance(each, DirectionTerm) for each in system.terms)
-    most = most if further is None else int(POSE_WALKS * most)
+    most = most if further is None else int(JOINT_ROUNDS_FRACTION * most)
     for q in islice(rounds or starts(system, homes, seed, setup), most):
         report("starts")
         if lies_near and known.count:
             # equilibria lie near each other
             own = np.array([each.point.q for each in known.isolated])
-            some = own[rng.integers(len(own), size=round(BESIDE * len(q)))]
+            some = own[rng.integers(len(own), size=round(NEARBY_STARTS_FRACTION * len(q)))]
             q = np.concatenate([q, walk_at_random(system, some, rng, 1 + len(fresh) % 3)])
         # what attracts matters most: two of five starts go down all along
         index = rng.integers(freedoms + 1, size=len(q)) * (rng.random(len(q)) < (0.0 if minima else 0.6))
@@ -145,7 +150,9 @@ def critical_points(
         fresh.append(known.add(points))
         points = []
         met.append(q)
-        least, part = (ENDING_DESCENTS, ENDING_LATE_DESCENT) if minima else (ENDING_LEAST, ENDING_LATE)
+        least, part = (
+            (ENDING_DESCENTS, LATE_STABLE_EQUILIBRIA_FRACTION) if minima else (ENDING_LEAST, LATE_EQUILIBRIA_FRACTION)
+        )
         if len(fresh) > least and sum(fresh[len(fresh) // 2 :]) <= part * known.count:
             break
     late, posed = sum(fresh[len(fresh) // 2 :]), 0
@@ -163,7 +170,7 @@ class DistinctPoints:
     move while the platform does not, the one within most joint limits is kept."""
 
     def __init__(self, system: ErrorSystem, setup: ObservedRobot) -> None:
-        self.system, self.setting, self.bodies = system, setup, placing_links(setup.decomposition)
+        self.system, self.setting, self.bodies = system, setup, list_placing_links(setup.decomposition)
         self.told, self.freedoms = told_by(setup), setup.samples.members[0].relation.dimension
         self.free = len(self.told) < len(setup.all_samples.observation_model.observations)
         self.own: dict[tuple[int, ...], list[tuple[Array, CriticalPoint, int]]] = {}
@@ -174,20 +181,24 @@ class DistinctPoints:
         new = 0
         if points:
             q = np.array([each.q for each in points])
-            good = are_closed(self.system, q, SAME_ENDING) & along_all(self.system, q)
+            good = are_closed(self.system, q, CRITICAL_POINT_DISTANCE_TOL) & along_all(self.system, q)
             points = [each for each, kept in zip(points, good, strict=True) if kept]
         told = marks(self.system, self.setting, self.bodies, points, self.told)
         for point, mark, across in zip(points, told, self._across(points), strict=True):
             more = len(point.curvatures) > self.freedoms
-            least = CRITICAL_FLAT if more else SAME_ENDING * self.system.scale(point.curvatures)
+            least = (
+                CRITICAL_CURVATURE_TOL if more else CRITICAL_POINT_DISTANCE_TOL * self.system.scale(point.curvatures)
+            )
             flat = np.abs(point.curvatures) < least
             key = (*(int(np.sum(each)) for each in (point.curvatures < -least, flat)),)
             if flat.any():
-                key = (*key, round(point.value / SAME_ENDING), *across)
+                key = (*key, round(point.value / CRITICAL_POINT_DISTANCE_TOL), *across)
                 self.families.setdefault(key, []).append(point)
                 continue
             own = self.own.setdefault(key, [])
-            near = next((k for k, each in enumerate(own) if np.abs(mark - each[0]).max() < SAME_ENDING), None)
+            near = next(
+                (k for k, each in enumerate(own) if np.abs(mark - each[0]).max() < CRITICAL_POINT_DISTANCE_TOL), None
+            )
             if near is None:
                 own.append((mark, point, 1))
                 new += 1
@@ -205,14 +216,18 @@ class DistinctPoints:
             return [[] for _ in points]
         carrier = SweptChains(self.system.system, list(np.array([each.q for each in points]).T))
         cosines = [np.broadcast_to(each.cosine(carrier).value, len(points)) for each in terms]
-        return (np.abs(np.stack(cosines, axis=-1)) < SAME_ENDING).astype(int).tolist()
+        return (np.abs(np.stack(cosines, axis=-1)) < CRITICAL_POINT_DISTANCE_TOL).astype(int).tolist()
 
     def _beyond(self, point: CriticalPoint) -> int:
         """Return the number of joints beyond their limits."""
         model = self.setting.all_samples.model
         try:
-            return len(outside(model, of_links(model, partial(self.system.system.pose, values=point.q.tolist())).q))
-        except LoopsNotClosed:
+            return len(
+                list_joints_beyond(
+                    model, build_from_link_poses(model, partial(self.system.system.pose, values=point.q.tolist())).q
+                )
+            )
+        except LoopClosureFailure:
             return len(model.mechanism.joints)
 
     def keep(self, fit: Callable[[Array], NDArray[np.bool_]]) -> None:
@@ -221,7 +236,7 @@ class DistinctPoints:
             kept = fit(np.array([point.q for _, point, _ in own])) if own else ()
             self.own[key] = [each for each, good in zip(own, kept, strict=True) if good]
         for key, points in self.families.items():
-            kept = fit(np.array([point.q for point in points[:FAMILY_TRIES]])) if points else ()
+            kept = fit(np.array([point.q for point in points[:FAMILY_POINTS_MAX]])) if points else ()
             self.families[key] = [each for each, good in zip(points, kept, strict=False) if good]
 
     @property
@@ -244,13 +259,13 @@ def anywhere(system: ErrorSystem, rng: np.random.Generator, count: int) -> Array
     """Closed configurations (c, N) to which random coordinates lead, as many as close. From every other one the slides
     alone are moved at first, as far as random turns need: what slides reach ends at no other limit."""
     slides = np.array([each.slides for each in system.system.coordinates])
-    q = rng.uniform(-1.0, 1.0, (count, len(slides))) * np.where(slides, WIDEST_SLIDE, np.pi)
+    q = rng.uniform(-1.0, 1.0, (count, len(slides))) * np.where(slides, PRISMATIC_START_MAX, np.pi)
     if slides.any():
-        wide = np.minimum(reaches(system), FARTHEST_ENDING) / WIDEST_SLIDE
+        wide = np.minimum(reaches(system), EQUILIBRIUM_COORDINATE_MAX) / PRISMATIC_START_MAX
         q[::2] *= np.where(slides, 1 + rng.uniform(size=(len(q[::2]), 1)) * (wide - 1), 1.0)
-        for _ in range(SLIDE_STEPS):
+        for _ in range(PRISMATIC_NEWTON_STEPS_COUNT):
             G, DG = system.closures(q[::2])
-            q[::2, slides] -= times(np.linalg.pinv(DG[:, :, slides], rcond=CLOSURES_MEET), G)
+            q[::2, slides] -= times(np.linalg.pinv(DG[:, :, slides], rcond=CLOSURE_CROSSING_VALUE_TOL), G)
     q = close_loops(system, q, 40)
     return q[are_closed(system, q)]
 
@@ -265,7 +280,7 @@ def reaches(system: ErrorSystem) -> Array:
     }
     return np.array(
         [
-            max(WIDEST_SLIDE, ends.get(each.joint, 0.0) / loops.length) if each.slides else 0.0
+            max(PRISMATIC_START_MAX, ends.get(each.joint, 0.0) / loops.length) if each.slides else 0.0
             for each in loops.coordinates
         ]
     )
@@ -279,11 +294,12 @@ def in_mode(system: ErrorSystem, setup: ObservedRobot, q: Array) -> NDArray[np.b
     poses = {link: system.system.pose(link, q.T) for link in drawn.model.mechanism.links}
     for k in range(len(q)):
         try:
-            at = of_links(drawn.model, {link: X[k] for link, X in poses.items()}.__getitem__)
-        except LoopsNotClosed:
+            at = build_from_link_poses(drawn.model, {link: X[k] for link, X in poses.items()}.__getitem__)
+        except LoopClosureFailure:
             continue
-        kept[k] = law.in_front(at) > SEEN_ABOVE and (
-            not system.size[1] or drawn.signature.agrees(Signature.of(relation(at, drawn.observation_model)))
+        kept[k] = law.in_front(at) > VISIBLE_SINE_MIN and (
+            not system.size[1]
+            or drawn.signature.may_be_same_mode(Signature.of(compute_relation(at, drawn.observation_model)))
         )
     return kept
 
@@ -292,11 +308,11 @@ def along_all(system: ErrorSystem, q: Array) -> NDArray[np.bool_]:
     """Return True for critical points (c, N) at which E is critical along all motions that the loops leave to first
     order: where two families of closures meet, multipliers without bound would hold any slope across these."""
     rates = system.closures(q)[1]
-    if system.supposes or not rates.shape[1]:
+    if system.has_assumed_depths or not rates.shape[1]:
         return np.ones(len(q), dtype=bool)
     _, sizes, ways = np.linalg.svd(rates, full_matrices=False)
     slopes = np.abs(times(ways, np.nan_to_num(CriticalPointEquations(system, list(q.T)).slope)))
-    return ~np.any((sizes < CLOSURES_MEET * sizes[:, :1]) & (slopes > CLOSURES_MEET), axis=1)
+    return ~np.any((sizes < CLOSURE_CROSSING_VALUE_TOL * sizes[:, :1]) & (slopes > CLOSURE_CROSSING_VALUE_TOL), axis=1)
 
 
 def marks(

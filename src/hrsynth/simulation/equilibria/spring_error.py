@@ -28,7 +28,7 @@ from ...closed_forms.legs import SlidingRod
 from ...geometry.affine import AffineForms, combine, stack
 from ...geometry.components import (
     Components,
-    combination,
+    combine_columns,
     cosine,
     dot,
     minus,
@@ -38,18 +38,24 @@ from ...geometry.components import (
     sqrt,
     transform_vector,
 )
-from ...geometry.so3 import quaternions
+from ...geometry.so3 import convert_to_quaternions
 from ...geometry.vectors import Array
-from ...tolerances import AFFINE_ROUNDING, EXACT, KNOWN_NUMBER, MET_AGAIN, SAME_ENDING
+from ...tolerances import (
+    AFFINE_ROUNDING,
+    CRITICAL_BOX_HALF_EDGE_MIN,
+    CRITICAL_POINT_DISTANCE_TOL,
+    EXACT_INCIDENCE_TOL,
+    FILE_NUMBER_TOL,
+)
 from .elimination import Flags, Places, away, entries, inverse
 from .joint_bounds import narrow_joint
 from .joint_error import JointError, of_robot, total
 from .loop_error import LoopSubdivision
 from .points_in_planes_error import TURNED, PlaneError
-from .pose_error import NotEnclosed, Number, PoseError
+from .pose_error import EnclosureFailure, Number, PoseError
 from .subdivision import CriticalBox, Subdivision, forms_of
 
-NEAREST_FAR = 2.0
+FAR_PLANE_DISTANCE_MIN = 2.0
 """Distance (characteristic lengths) from which planes count as far away."""
 PAIRS, OTHERS = ((0, 1), (0, 2), (1, 2)), ((1, 2), (0, 2), (0, 1))
 """The pairs of three rods; and those of the others, of each."""
@@ -117,7 +123,7 @@ class SpringError(JointError):
 
     @classmethod
     def about(cls, error: PoseError) -> SpringError:
-        """Build the error of three such rods; raises ``NotEnclosed`` if a pose's error is another."""
+        """Build the error of three such rods; raises ``EnclosureFailure`` if a pose's error is another."""
         limbs = [error.limbs[each.limb] for each in error.seen if each.limb is not None]
         if (
             error.size < 6
@@ -125,12 +131,15 @@ class SpringError(JointError):
             or len(limbs) != 3
             or not all(isinstance(each, SlidingRod) and each.aside == 0 and each.axis is None for each in limbs)
         ):
-            raise NotEnclosed(
+            raise EnclosureFailure(
                 "the platform rotates about more than one axis, and the observed legs are not three sliding rods"
             )
         found = cls(error, (), error, shortest=0.0)
-        if abs(np.linalg.det(found.desired)) < SAME_ENDING or found.sizes[3] < SAME_ENDING:
-            raise NotEnclosed("the observed legs do not determine the platform's plane")
+        if (
+            abs(np.linalg.det(found.desired)) < CRITICAL_POINT_DISTANCE_TOL
+            or found.sizes[3] < CRITICAL_POINT_DISTANCE_TOL
+        ):
+            raise EnclosureFailure("the observed legs do not determine the platform's plane")
         return found
 
     @property
@@ -172,7 +181,7 @@ class SpringError(JointError):
         b = self.points
         sides = [float(np.linalg.norm(b[i] - b[j])) for i, j in PAIRS]
         area = float(np.linalg.norm(np.cross(b[1] - b[0], b[2] - b[0])))
-        return np.array([*sides, area / max(*sides, EXACT)])
+        return np.array([*sides, area / max(*sides, EXACT_INCIDENCE_TOL)])
 
     @property
     def charts(self) -> tuple[SpringError, ...]:
@@ -208,7 +217,7 @@ class SpringError(JointError):
         return np.full(6, np.inf)
 
     def box(self, low: Array, high: Array, reach: float) -> tuple[Array, Array]:
-        most = 1 / NEAREST_FAR if self.distant else NEAREST_FAR
+        most = 1 / FAR_PLANE_DISTANCE_MIN if self.distant else FAR_PLANE_DISTANCE_MIN
         high = np.array([1.0, 1.0, most, *(np.pi / 2 for _ in range(3)), np.pi])
         return -high, high
 
@@ -343,7 +352,7 @@ class SpringError(JointError):
             shift = [dot(point, number(way)) for way in error.shifts.T]
             if far is not None:
                 shift = [(1.0 if k == far else each) * (1.0 / shift[far]) for k, each in enumerate(shift)]
-            parts = [combination([*R, number(1.0)], row[None], number)[0] for row in PRODUCTS[one]]
+            parts = [combine_columns([*R, number(1.0)], row[None], number)[0] for row in PRODUCTS[one]]
             return [*shift, *(each * (1.0 / parts[one]) for k, each in enumerate(parts) if k != one)]
 
         return of_robot(formula, 7)
@@ -422,7 +431,7 @@ class SpringSubdivision(LoopSubdivision):
             radius = (np.maximum(np.abs(least), np.abs(most)) + (most - least) / 2) / 2
             for length, (i, j) in zip(error.sizes, PAIRS, strict=False):
                 away_, room = np.linalg.norm(middle[:, i] - middle[:, j], axis=1), radius[:, i] + radius[:, j]
-                found |= np.abs(away_ - length) > room + 8 * KNOWN_NUMBER * (1 + away_ + room)
+                found |= np.abs(away_ - length) > room + 8 * FILE_NUMBER_TOL * (1 + away_ + room)
         return found
 
     def _settle(self, tube: list[AffineForms], P: Places, N: Places) -> tuple[Flags, AffineForms]:
@@ -441,7 +450,7 @@ class SpringSubdivision(LoopSubdivision):
             wanted = np.einsum("ij,ik->ijk", np.eye(3), self.error.desired).reshape(3, 9)
             cosines = combine(np.broadcast_to(wanted, (len(y), 3, 9)), over.directions.together(forms))
             margins = stack(part._values(forms)[3])
-            out = np.any(cosines.size < SAME_ENDING, axis=1) | np.any(margins.high < 0, axis=1)
+            out = np.any(cosines.size < CRITICAL_POINT_DISTANCE_TOL, axis=1) | np.any(margins.high < 0, axis=1)
             good = ~out & proved[own] & np.all(margins.low > 0, axis=1)
             still = np.broadcast_to(np.eye(y.shape[1]), (int(good.sum()), *2 * y.shape[1:]))
             found += part._report(y[good], room[good], still) if good.any() else []
@@ -454,7 +463,7 @@ class SpringSubdivision(LoopSubdivision):
         short = np.abs(np.cos(x[:, 3:6])) < np.abs(np.sin(x[:, 3:6]))
         rows = np.concatenate([np.broadcast_to(np.arange(4), (len(x), 4)), 4 + np.arange(3) + 3 * short], axis=1)
         proved = np.zeros(len(x), dtype=bool)
-        for radius in MET_AGAIN * 4.0 ** np.arange(-3, 4):
+        for radius in CRITICAL_BOX_HALF_EDGE_MIN * 4.0 ** np.arange(-3, 4):
             about = np.full(x.shape, radius)
             F, K = self._equations(x, forms_of(x, about))
             F, K = entries(F, rows), entries(K.transposed(), rows).transposed()
@@ -469,7 +478,7 @@ class SpringSubdivision(LoopSubdivision):
         """Yield the error over the pose in some charts, the formula of the coordinates there, and the zeros (c, 7) to
         which it applies."""
         R = np.reshape([self.error.rotation(list(each), np.asarray) for each in x], (-1, 3, 3))
-        near = np.abs(quaternions(R)).argmax(axis=1)
+        near = np.abs(convert_to_quaternions(R)).argmax(axis=1)
         # where not all rods slide, no leg reaches far
         slide = all(isinstance(each, SlidingRod) for each in self.error.error.limbs)
         for one in range(4):
@@ -477,7 +486,7 @@ class SpringSubdivision(LoopSubdivision):
             shift = np.full((len(x), 3), np.nan)
             shift[own] = _about(self.error.tell_pose(one, None), x[own], 0 * x[own])[0][:, :3]
             with np.errstate(invalid="ignore"):
-                away_, most = slide & (np.abs(shift).max(axis=1) > NEAREST_FAR), np.abs(shift).argmax(axis=1)
+                away_, most = slide & (np.abs(shift).max(axis=1) > FAR_PLANE_DISTANCE_MIN), np.abs(shift).argmax(axis=1)
             for far in (None, 0, 1, 2):
                 some = own & (~away_ if far is None else away_ & (most == far))
                 if some.any():

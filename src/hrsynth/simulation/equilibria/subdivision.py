@@ -20,13 +20,20 @@ from typing import Any
 
 import numpy as np
 
-from ...budgets import BOX_PARTS, BOXES_A_PART, BOXES_ALONE, BOXES_AT_ONCE
-from ...geometry.affine import AffineForms, affine, combine, stack
+from ...budgets import BOX_PARTS, BOXES_A_PART, SERIAL_SUBDIVISION_BOXES_COUNT, SUBDIVISION_BATCH_COUNT
+from ...geometry.affine import AffineForms, combine, make_affine, stack
 from ...geometry.vectors import Array
 from ...processes import run_shared
 from ...progress import report
 from ...results import Value
-from ...tolerances import AFFINE_ROUNDING, BOX_ROUNDING, MET_AGAIN, SINGULAR_BOX, SMALLEST_BOX, THINNEST_BOX
+from ...tolerances import (
+    AFFINE_ROUNDING,
+    BOX_EDGE_RATIO_MIN,
+    BOX_EDGE_ROUNDING_TOL,
+    CRITICAL_BOX_HALF_EDGE_MIN,
+    POSE_BOX_MIN_FRACTION,
+    SINGULAR_BOX_MIN_FRACTION,
+)
 from .cones import cut
 from .elimination import (
     Flags,
@@ -46,22 +53,22 @@ from .joint_error import JointError
 
 WIDER = (1.25, 4.0)
 """Factors by which boxes are enlarged, one after the other, to prove exactly one zero."""
-INFLATED = 4.0
+ZERO_BOX_INFLATION_FRACTION = 4.0
 """Least size of such boxes over the uncertainty of a zero nearby."""
 AROUND = 16.0 ** np.arange(4, -1, -1)
 """Least sizes of enclosing boxes over the smallest boxes, one after the other."""
 SINGULAR = -2
 """In the place of an axis: a box is left open, ∇g may lose rank in it."""
-STRETCHED = 8.0
+BOX_EDGE_RATIO_MAX = 8.0
 """Ratio of a box's edges, as parts of those of the whole, above which the longest is cut."""
-TOLD = 2.0
+JOINT_SLOPE_WEIGHT_FRACTION = 2.0
 """Factor for slopes by joints in the choice of the dependent coordinates: joints follow in closed form."""
-FOLLOWING = 0.25
+DEPENDENT_EDGE_FRACTION = 0.25
 """Fraction of its edge that counts for a dependent coordinate in the choice of the edge to cut."""
-COARSE = 0.02
+COARSE_EDGE_MIN_FRACTION = 0.02
 """Fraction of the whole box above which edges count so: in small remaining boxes the other coordinates may determine
 nothing."""
-NARROWED = 0.6
+NARROWED_EDGE_FRACTION = 0.6
 """Part of an edge to which g = 0 narrows it below which a box is looked at again before it is cut."""
 
 
@@ -99,7 +106,7 @@ class Subdivision:
     flat: list[tuple[Array, Array, Array]] = field(default_factory=list)
     """Zeros that are flat, the room in a frame, and this (columns)."""
 
-    singular: float = SINGULAR_BOX
+    singular: float = SINGULAR_BOX_MIN_FRACTION
     """Part of the whole: boxes with edges below it in which equations may be dependent are not cut further."""
 
     @property
@@ -137,7 +144,7 @@ class Subdivision:
                 f"{budget:,}, {waiting:,} waiting"
             )
 
-        middle, half = self._cut(middle, half, min(budget, self.boxes + BOXES_ALONE), say)
+        middle, half = self._cut(middle, half, min(budget, self.boxes + SERIAL_SUBDIVISION_BOXES_COUNT), say)
         if len(middle) and self.boxes < budget:
             given = pickle.dumps(replace(self, boxes=0, left=[], lost=[], proved=[], flat=[]))
             while len(middle) and self.boxes < budget:
@@ -176,10 +183,10 @@ class Subdivision:
         while len(middle) and self.boxes < budget:
             say(self.boxes, len(middle), share + self._fill(half))
             # the smallest first: memory stays small
-            first = max(0, len(middle) - min(BOXES_AT_ONCE, budget - self.boxes))
+            first = max(0, len(middle) - min(SUBDIVISION_BATCH_COUNT, budget - self.boxes))
             part, size, axis = self._open(middle[first:], half[first:])
             self.boxes += len(middle) - first
-            lost, small = axis == SINGULAR, np.all(size <= SMALLEST_BOX * self.whole, axis=1)
+            lost, small = axis == SINGULAR, np.all(size <= POSE_BOX_MIN_FRACTION * self.whole, axis=1)
             for where, boxes in ((small & ~lost, self.left), (lost, self.lost)):
                 boxes += list(zip(part[where], size[where], strict=True))
             share += self._fill(size[small & ~lost])
@@ -196,7 +203,7 @@ class Subdivision:
         low, high = self._narrow(middle, half)
         known = np.all(low <= high, axis=1)
         low, high = low[known], high[known]
-        middle, half = (low + high) / 2, (high - low) / 2 * (1 + BOX_ROUNDING)
+        middle, half = (low + high) / 2, (high - low) / 2 * (1 + BOX_EDGE_ROUNDING_TOL)
         forms = forms_of(middle, half)
         g = (
             self.error.closing.together(forms)
@@ -217,17 +224,20 @@ class Subdivision:
         gone = np.any(low > high, axis=1)
         with np.errstate(all="ignore"):
             J = np.where(half[:, None] > 0, np.moveaxis(g.v[1:], 0, -1) / half[:, None], 0.0)
-        J[:, :, self.error.freedoms :] *= TOLD
+        J[:, :, self.error.freedoms :] *= JOINT_SLOPE_WEIGHT_FRACTION
         P, N = pivots(J)
         back = inverse(columns(np.moveaxis(g.v[1:], 0, -1), P))
         follow = combine(back, g)
         inner = _narrow_symbols(follow, P)
         low, high = np.maximum(low, inner[0]), np.minimum(high, inner[1])
         gone |= np.any(low > high, axis=1)
-        own, size = middle + half * (low + high) / 2, half * np.maximum((high - low) / 2, 0.0) * (1 + BOX_ROUNDING)
+        own, size = (
+            middle + half * (low + high) / 2,
+            half * np.maximum((high - low) / 2, 0.0) * (1 + BOX_EDGE_ROUNDING_TOL),
+        )
         axis = np.full(len(middle), -1)
-        tiny = np.all(size <= 100 * SMALLEST_BOX * self.whole, axis=1)
-        look = np.flatnonzero(~gone & (tiny | np.all(high - low >= 2 * NARROWED, axis=1)))
+        tiny = np.all(size <= 100 * POSE_BOX_MIN_FRACTION * self.whole, axis=1)
+        look = np.flatnonzero(~gone & (tiny | np.all(high - low >= 2 * NARROWED_EDGE_FRACTION, axis=1)))
         if len(look):
             tube, loose = _tube(
                 own[look],
@@ -282,11 +292,11 @@ class Subdivision:
         and no edge is much longer than the others; else the longest of N, or one of the other loose ones where it is
         longer still: cutting along all axes would give more and smaller pieces of a surface that N determines."""
         share, slopes = size / self.whole, np.abs(np.moveaxis(F.v[1 : 1 + N.shape[1]], 0, -1)).max(axis=1, initial=0.0)
-        changes, large = np.zeros(share.shape), share.max(axis=1, keepdims=True) > COARSE
-        weight = np.where(loose, np.where(large, FOLLOWING, 1.0), 0.0)
+        changes, large = np.zeros(share.shape), share.max(axis=1, keepdims=True) > COARSE_EDGE_MIN_FRACTION
+        weight = np.where(loose, np.where(large, DEPENDENT_EDGE_FRACTION, 1.0), 0.0)
         np.put_along_axis(changes, N, np.where(np.isfinite(slopes), slopes, 0.0), 1)
         np.put_along_axis(weight, N, 1.0, 1)
-        even = share.max(axis=1) <= STRETCHED * np.take_along_axis(share, N, 1).max(axis=1)
+        even = share.max(axis=1) <= BOX_EDGE_RATIO_MAX * np.take_along_axis(share, N, 1).max(axis=1)
         known = even & np.isfinite(F.r).all(axis=1) & changes.any(axis=1) & (loose.sum(axis=1) == N.shape[1])
         return np.where(known, changes.argmax(axis=1), (share * weight).argmax(axis=1))
 
@@ -307,11 +317,16 @@ class Subdivision:
         """Boxes (c, n) in which, made ``wider``, exactly one zero is proved, or that there is none in them."""
         n, wide = (
             self.error.size[0],
-            np.maximum(wider * np.maximum(half, THINNEST_BOX * half.max(axis=1, keepdims=True)), MET_AGAIN),
+            np.maximum(
+                wider * np.maximum(half, BOX_EDGE_RATIO_MIN * half.max(axis=1, keepdims=True)),
+                CRITICAL_BOX_HALF_EDGE_MIN,
+            ),
         )
         multipliers, known = self._multipliers(middle, wide, P)
         mu = multipliers.v[0]
-        room = np.maximum(multipliers.spread.max(axis=1, keepdims=True, initial=0.0), MET_AGAIN) * np.ones_like(mu)
+        room = np.maximum(
+            multipliers.spread.max(axis=1, keepdims=True, initial=0.0), CRITICAL_BOX_HALF_EDGE_MIN
+        ) * np.ones_like(mu)
         at, about = np.concatenate([middle, mu], axis=1), np.concatenate([wide, WIDER[0] * room], axis=1)
         shift, reach = self._krawczyk(at, about)
         with np.errstate(all="ignore"):
@@ -325,7 +340,7 @@ class Subdivision:
         """Boxes (c, n) that lie, with their multipliers, in a box about a zero nearby that is proved to be the only one
         there: in the frame of K there, in which what is flat, or what numbers of the file leave open, is one direction,
         however steep the others are (epsilon-inflation). New ones are sought from the smallest boxes alone."""
-        smallest = np.all(half <= SMALLEST_BOX * self.whole, axis=1)
+        smallest = np.all(half <= POSE_BOX_MIN_FRACTION * self.whole, axis=1)
         if not self.flat and not smallest.any():
             return smallest
         own, known = self._with_multipliers(middle, half, P)
@@ -336,10 +351,10 @@ class Subdivision:
         x = self._approach(own.v[0, left])
         x = np.where(np.isfinite(x), x, 0.0)
         frame = self._frame(x)
-        open_by = INFLATED * self._krawczyk(x, 0 * x, frame)[1]
+        open_by = ZERO_BOX_INFLATION_FRACTION * self._krawczyk(x, 0 * x, frame)[1]
         own, y = AffineForms(own.v[:, left], own.r[left]), x[:, : middle.shape[1]]
         for times in AROUND:
-            cube = np.full(y.shape, times * SMALLEST_BOX * float(self.whole.max()))
+            cube = np.full(y.shape, times * POSE_BOX_MIN_FRACTION * float(self.whole.max()))
             about = np.maximum(open_by, WIDER[0] * _apart(self._with_multipliers(y, cube, P[left])[0], x, frame))
             with np.errstate(all="ignore"):
                 one = np.all(self._krawczyk(x, about, frame)[1] < about, axis=1)
@@ -378,7 +393,7 @@ class Subdivision:
         with np.errstate(all="ignore"):
             most = (pull.size.max(axis=1, initial=0.0) / (1 - off.sum(axis=-1).max(axis=1, initial=0.0)))[:, None]
             found = AffineForms(
-                -pull.v, (pull.r + np.abs(pull.v[0]) + (off * most[:, None]).sum(axis=-1)) * (1 + BOX_ROUNDING)
+                -pull.v, (pull.r + np.abs(pull.v[0]) + (off * most[:, None]).sum(axis=-1)) * (1 + BOX_EDGE_ROUNDING_TOL)
             )
         found.v[0] = mu
         known = np.isfinite(found.size).all(axis=1) & np.all(most >= 0, axis=1)
@@ -437,7 +452,7 @@ class Subdivision:
         at, room, frame = self._rooms()
         x, reach, left, back = self._approach(at), room.copy(), np.arange(len(at)), inverse(frame)
         apart = np.abs(back @ (x - at)[..., None])[..., 0]
-        for radius in MET_AGAIN * 4.0 ** np.arange(8):
+        for radius in CRITICAL_BOX_HALF_EDGE_MIN * 4.0 ** np.arange(8):
             found = self._krawczyk(x[left], np.full(x[left].shape, radius), frame[left])[1]
             done = np.all((found < radius) & (apart[left] + radius <= room[left]), axis=1)
             reach[left[done]] = found[done]
@@ -516,12 +531,12 @@ def forms_of(middle: Array, half: Array, frame: Array | None = None) -> list[Aff
     have rounded."""
     off = AFFINE_ROUNDING * (1 + np.abs(middle))
     edges = half[:, None] * (np.eye(middle.shape[1]) if frame is None else frame)
-    return [affine(middle[:, i], edges[:, i], off[:, i]) for i in range(middle.shape[1])]
+    return [make_affine(middle[:, i], edges[:, i], off[:, i]) for i in range(middle.shape[1])]
 
 
 def hull(half: Array, frame: Array) -> Array:
     """Return the half edges, in the coordinates themselves, of boxes (c, n) in frames."""
-    return np.asarray((np.abs(frame) @ half[..., None])[..., 0] * (1 + BOX_ROUNDING))
+    return np.asarray((np.abs(frame) @ half[..., None])[..., 0] * (1 + BOX_EDGE_ROUNDING_TOL))
 
 
 def _apart(boxes: AffineForms, at: Array, frame: Array) -> Array:
@@ -547,7 +562,7 @@ def _narrow_symbols(g: AffineForms, P: Places | None = None) -> tuple[Array, Arr
         size = np.where(np.arange(size.shape[2]) == P[:, :, None], size, 0.0)
     rest = np.abs(J).sum(axis=2, keepdims=True) - np.abs(J) * (size > 0) + g.r[:, :, None]
     with np.errstate(all="ignore"):
-        far = np.where(size > 0, rest * (1 + BOX_ROUNDING) / size, np.inf) + BOX_ROUNDING
+        far = np.where(size > 0, rest * (1 + BOX_EDGE_ROUNDING_TOL) / size, np.inf) + BOX_EDGE_ROUNDING_TOL
         at = np.where(size > 0, -g.v[0][:, :, None] / J, 0.0)
     far, at = np.where(np.isfinite(far) & np.isfinite(at), far, np.inf), np.where(np.isfinite(at), at, 0.0)
     return (at - far).max(axis=1, initial=-1.0), (at + far).min(axis=1, initial=1.0)
@@ -570,9 +585,9 @@ def _tube(
         at = np.take_along_axis(old, P, 1) - wide * (follow.v[0] + (J * shift[:, None]).sum(-1))
         along, doubt = (
             -wide[:, :, None] * np.concatenate([J * ratio[:, None], doubts], 2),
-            wide * (follow.r + BOX_ROUNDING),
+            wide * (follow.r + BOX_EDGE_ROUNDING_TOL),
         )
-        rounded = wide * (np.maximum(follow.r - np.abs(doubts).sum(axis=2), 0.0) + 2 * BOX_ROUNDING)
+        rounded = wide * (np.maximum(follow.r - np.abs(doubts).sum(axis=2), 0.0) + 2 * BOX_EDGE_ROUNDING_TOL)
     plain = np.take_along_axis(half, P, 1)
     good = np.isfinite(doubt) & np.isfinite(at) & np.isfinite(along).all(axis=-1) & (doubt < plain)
     centre = middle.copy()
@@ -580,5 +595,5 @@ def _tube(
     np.put_along_axis(slopes, P[:, :, None], np.where(good[:, :, None], along, 0.0), 1)
     np.put_along_axis(radius, P, np.where(good, rounded, plain), 1)
     loose = np.ones((c, n), dtype=bool)
-    np.put_along_axis(loose, P, ~(good & (doubt < NARROWED * plain)), 1)
-    return [affine(centre[:, i], slopes[:, i], radius[:, i]) for i in range(n)], loose
+    np.put_along_axis(loose, P, ~(good & (doubt < NARROWED_EDGE_FRACTION * plain)), 1)
+    return [make_affine(centre[:, i], slopes[:, i], radius[:, i]) for i in range(n)], loose

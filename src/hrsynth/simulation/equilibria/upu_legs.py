@@ -25,7 +25,7 @@ from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism import JointType
 from ...results import Value
-from ...tolerances import EXACT, FOLLOWED, SHORT_SHARE, SHORTEST_ROD
+from ...tolerances import EXACT_INCIDENCE_TOL, HIDDEN_ROBOT_RESIDUAL_TOL, SHORT_ROD_BOX_FRACTION, SLIDING_ROD_LENGTH_MIN
 from .joint_error import JointError, rodless
 from .pose_error import ObservedDirection, PoseError
 
@@ -63,12 +63,12 @@ class Struts(Value):
             square = [slides[0].axis @ inner[0], *(a @ b for a, b in zip(outer, inner, strict=True))]
             turn = goal.pose(leg.platform_link)[:3, :3] @ mechanism.links[leg.platform_link].pose[:3, :3].T
             off = [np.cross(inner[0], inner[1]), np.cross(outer[0], turn @ outer[1])]
-            if np.abs(square).max() > EXACT or np.abs(off).max() > FOLLOWED:
+            if np.abs(square).max() > EXACT_INCIDENCE_TOL or np.abs(off).max() > HIDDEN_ROBOT_RESIDUAL_TOL:
                 return None
             axes.append(outer[0])
         found = np.array(axes)
         struts = cls(error, found, tuple(parallel(found)))
-        return None if any(map(coincide, struts.lines)) else struts
+        return None if any(map(has_coincident_lines, struts.lines)) else struts
 
     def turned(self, turn: Array) -> PoseError:
         """The error with the platform turned."""
@@ -88,7 +88,7 @@ class Struts(Value):
         found = []
         for error in map(self.turned, self.turns):
             gap = min((float(np.linalg.norm(a - b)) for a, b in combinations(rodless(error), 2)), default=1.0)
-            found.append(JointError.of(error, self.error, max(SHORT_SHARE * gap, SHORTEST_ROD)))
+            found.append(JointError.of(error, self.error, max(SHORT_ROD_BOX_FRACTION * gap, SLIDING_ROD_LENGTH_MIN)))
         return found
 
     def locked_errors(self) -> list[JointError]:
@@ -129,16 +129,17 @@ def meetings(every: Sequence[Line]) -> list[Array]:
     """The points at which lines that are not parallel meet, each once."""
     found: list[Array] = []
     for pair in combinations(every, 2):
-        point = lines.meeting_point(list(pair), FOLLOWED)
-        if point is not None and all(np.linalg.norm(point - other) > FOLLOWED for other in found):
+        point = lines.find_meeting_point(list(pair), HIDDEN_ROBOT_RESIDUAL_TOL)
+        if point is not None and all(np.linalg.norm(point - other) > HIDDEN_ROBOT_RESIDUAL_TOL for other in found):
             found.append(point)
     return found
 
 
-def coincide(every: Sequence[Line]) -> bool:
+def has_coincident_lines(every: Sequence[Line]) -> bool:
     """Return True if two lines are one: two legs lock all along it, not only at points."""
     return any(
-        lines.parallel(a, b) and lines.distance(p, q, b) <= FOLLOWED for (p, a), (q, b) in combinations(every, 2)
+        lines.is_parallel(a, b) and lines.measure_line_distance(p, q, b) <= HIDDEN_ROBOT_RESIDUAL_TOL
+        for (p, a), (q, b) in combinations(every, 2)
     )
 
 
@@ -146,11 +147,14 @@ def parallel(axes: Array) -> Iterator[Array]:
     """All rotations (3, 3) that carry each of some axes (n, 3) along itself, either way, the unit first; that alone
     where all are parallel, which leaves it any turn."""
     yield np.eye(3)
-    if np.linalg.matrix_rank(axes, FOLLOWED) < 2:
+    if np.linalg.matrix_rank(axes, HIDDEN_ROBOT_RESIDUAL_TOL) < 2:
         return
     for signs in product((1.0, -1.0), repeat=len(axes)):
         wanted = np.array(signs)[:, None] * axes
         U, _, V = np.linalg.svd(wanted.T @ axes)
         turn = U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V
-        if np.abs(axes @ turn.T - wanted).max() < FOLLOWED and np.trace(turn) < 3 - FOLLOWED:
+        if (
+            np.abs(axes @ turn.T - wanted).max() < HIDDEN_ROBOT_RESIDUAL_TOL
+            and np.trace(turn) < 3 - HIDDEN_ROBOT_RESIDUAL_TOL
+        ):
             yield turn

@@ -5,15 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 from ...file_format import FileFormat, RobotFile
-from .settings import ENDINGS, partner, settings_beside
+from .settings import ENDINGS, find_partner, find_settings
 
 
-def _files(path: Path) -> tuple[Path, ...]:
+def _list_files(path: Path) -> tuple[Path, ...]:
     return path.with_suffix(".urdf"), path if path.suffix.lower() in ENDINGS else path.with_suffix(".yaml")
 
 
-def _knows(file: RobotFile) -> bool:
-    return file.root is None or settings_beside(file) is not None
+def _is_gepetto_file(file: RobotFile) -> bool:
+    return file.root is None or find_settings(file) is not None
 
 
-DIALECT = FileFormat("gepetto", _knows, ENDINGS, _files, rank=-1, partner=partner)
+DIALECT = FileFormat("gepetto", _is_gepetto_file, ENDINGS, _list_files, rank=-1, partner=find_partner)

@@ -15,9 +15,9 @@ from ... import xml
 from ...chains import CUT, END, WELD
 from ...file_format import RobotFile
 from ...jointgraph import FrameSpec, JointGraph
-from ...vocabulary import misspelt
+from ...vocabulary import find_misspelt
 from ..urdf.read import read as read_urdf
-from .settings import KEYS, frames_of, settings_beside, settings_in, urdf_beside
+from .settings import KEYS, collect_frame_names, find_settings, find_urdf, read_settings
 
 TYPES = {
     "SPHERICAL": JointType.SPHERICAL,
@@ -30,20 +30,20 @@ TYPES = {
     "FREEFLYER": JointType.FREE,
 }
 
-LONGEST_NAME = 200
+GEPETTO_NAME_CHARACTERS_MAX = 200
 
 
 def read(file: RobotFile) -> JointGraph:
     """Return the joint graph of either of the two files."""
-    found = settings_beside(file)
-    beside, settings = (file.path, settings_in(file.path)) if found is None else found
-    path = urdf_beside(file.path, frames_of(settings or {})) if found is None else file.path
+    found = find_settings(file)
+    beside, settings = (file.path, read_settings(file.path)) if found is None else found
+    path = find_urdf(file.path, collect_frame_names(settings or {})) if found is None else file.path
     if settings is None:
-        raise xml.refusal(beside, "none of the keys of the Gepetto format", ", ".join(KEYS))
+        raise xml.make_file_error(beside, "none of the keys of the Gepetto format", ", ".join(KEYS))
     if not file.as_spelt:
         _require_spelling(beside, settings)
     notes: list[Note] = []
-    root = xml.document(xml.content(path), str(path), notes) if file.root is None else file.root
+    root = xml.parse_document(xml.read_bytes(path), str(path), notes) if file.root is None else file.root
     graph = read_urdf(replace(file, path=path, root=root), frames=not settings.get("closed_loop"))
     graph.dialect = "Gepetto"
     graph.notes[:0] = notes
@@ -56,10 +56,10 @@ def read(file: RobotFile) -> JointGraph:
 
 def _require_spelling(path: Path, said: dict[str, Any]) -> None:
     """Raise ``BadRobotFile`` for keys that are misspellings of missing ones."""
-    lines = xml.content(path).decode("utf-8").splitlines()
+    lines = xml.read_bytes(path).decode("utf-8").splitlines()
     wrong = []
     for key in (str(key) for key in said if key not in KEYS):
-        if meant := misspelt(key, set(KEYS) - set(said)):
+        if meant := find_misspelt(key, set(KEYS) - set(said)):
             line = next((number for number, text in enumerate(lines, 1) if text.strip("'\"").startswith(key)), None)
             wrong.append(Defect(str(path), line, "unknown key", key, " or ".join(meant)))
     if wrong:
@@ -84,24 +84,24 @@ class _Settings:
         if value is None:
             return []
         if not isinstance(value, list):
-            raise xml.refusal(self.path, f"{key}: not a list", "a list")
+            raise xml.make_file_error(self.path, f"{key}: not a list", "a list")
         return value
 
     def _name(self, key: str, value: object) -> str:
-        if not isinstance(value, str) or len(value) > LONGEST_NAME:
-            raise xml.refusal(self.path, f"{key}: {str(value)[:60]!r} is not a name", "names")
+        if not isinstance(value, str) or len(value) > GEPETTO_NAME_CHARACTERS_MAX:
+            raise xml.make_file_error(self.path, f"{key}: {str(value)[:60]!r} is not a name", "names")
         return value
 
     def _types(self) -> None:
         names, kinds = self._list("joint_name"), self._list("joint_type")
         if len(names) != len(kinds):
-            raise xml.refusal(self.path, "joint_name and joint_type differ in length", None)
+            raise xml.make_file_error(self.path, "joint_name and joint_type differ in length", None)
         for raw, kind in zip(names, kinds, strict=True):
             name = self._name("joint_name", raw)
             joint = self.graph.joints.get(name)
-            found = _type(self._name("joint_type", kind))
+            found = _parse_joint_type(self._name("joint_type", kind))
             if joint is None or found is None:
-                raise xml.refusal(
+                raise xml.make_file_error(
                     self.path,
                     f"joint_name {name!r} with joint_type {str(kind)[:40]!r}",
                     "a joint of the URDF; SPHERICAL, FIXED, UJOINT_XY, REVOLUTE_X, PRISMATIC_X …",
@@ -112,15 +112,15 @@ class _Settings:
         pairs, kinds = self._list("closed_loop"), self._list("type")
         if pairs and all(isinstance(each, str) for each in pairs):
             if len(pairs) % 2:
-                raise xml.refusal(self.path, "closed_loop: not pairs of frames", "[[frame, frame], …]")
+                raise xml.make_file_error(self.path, "closed_loop: not pairs of frames", "[[frame, frame], …]")
             pairs = [pairs[i : i + 2] for i in range(0, len(pairs), 2)]
         words = self._kinds(kinds, len(pairs))
         for number, pair in enumerate(pairs):
             if not isinstance(pair, list) or len(pair) != 2:
-                raise xml.refusal(self.path, "closed_loop: not pairs of frames", "[[frame, frame], …]")
+                raise xml.make_file_error(self.path, "closed_loop: not pairs of frames", "[[frame, frame], …]")
             links = [self._link(self._name("closed_loop", name)) for name in pair]
             if links[0] == links[1]:
-                raise xml.refusal(
+                raise xml.make_file_error(
                     self.path, f"closed_loop: {pair[0]!r} and {pair[1]!r} are on the same link", "two links"
                 )
             point = words[number] == "3d"
@@ -141,10 +141,10 @@ class _Settings:
     def _kinds(self, kinds: list[Any], count: int) -> list[str | None]:
         """Return the closures' types in small letters, None if absent: this format reads all but ``3d`` as 6d."""
         if len(kinds) > count:
-            raise xml.refusal(self.path, f"type: {len(kinds)} types for {count} closures", "at most one each")
+            raise xml.make_file_error(self.path, f"type: {len(kinds)} types for {count} closures", "at most one each")
         words = [self._name("type", kind).lower() for kind in kinds]
         if wrong := [word for word in words if not any(map(str.isalpha, word))]:
-            raise xml.refusal(self.path, f"type: unknown type {wrong[0]!r}", "3d, 6d")
+            raise xml.make_file_error(self.path, f"type: unknown type {wrong[0]!r}", "3d, 6d")
         return [*words, *[None] * (count - len(words))]
 
     def _link(self, frame: str) -> str:
@@ -153,7 +153,7 @@ class _Settings:
             return frame
         if frame in self.graph.joints:
             return self.graph.joints[frame].links[1]
-        raise xml.refusal(self.path, f"closed_loop: unknown frame {frame!r}", "links and joints of the URDF")
+        raise xml.make_file_error(self.path, f"closed_loop: unknown frame {frame!r}", "links and joints of the URDF")
 
     def _motors(self) -> None:
         joints = self.graph.joints
@@ -168,11 +168,11 @@ class _Settings:
                 )
         for name in wanted:
             if name not in joints or joints[name].type is JointType.FIXED:
-                raise xml.refusal(self.path, f"name_mot: no movable joint {name!r}", "joints of the URDF")
+                raise xml.make_file_error(self.path, f"name_mot: no movable joint {name!r}", "joints of the URDF")
             joints[name] = replace(joints[name], motor=joints[name].motor or Motor(name))
 
 
-def _type(name: str) -> tuple[JointType, tuple[Array, ...]] | None:
+def _parse_joint_type(name: str) -> tuple[JointType, tuple[Array, ...]] | None:
     """Return the joint type of a name of this format, with its axes."""
     stem, _, letters = name.upper().partition("_")
     axes = tuple(np.eye(3)["XYZ".index(letter)] for letter in letters if letter in "XYZ")

@@ -6,12 +6,12 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from ....geometry.vectors import pose
+from ....geometry.vectors import build_pose
 from ....mechanism.model import Joint, JointType, Link, Mechanism
 from ...chains import CUT, END, WELD
 from ...file_format import Written
 from ...reduction import reduce
-from ..native.write import joint_names, text
+from ..native.write import list_joint_names, write_text
 
 
 def write(mechanism: Mechanism) -> Written:
@@ -29,18 +29,20 @@ def write(mechanism: Mechanism) -> Written:
         for link, suffix in zip(joint.links, (CUT, END), strict=True):
             name = stem + suffix
             if name not in links:
-                links[name] = Link(name, pose(joint.point))
+                links[name] = Link(name, build_pose(joint.point))
                 joints[name] = Joint(name, JointType.FIXED, link, name, joint.point)
             frames.append(name)
         pairs.append(frames)
         kinds.append("3d" if joint.type is JointType.SPHERICAL else "6d")
     tree = replace(robot, links=links, joints=joints)
-    motors = [name for joint in joints.values() if joint.actuated for name in joint_names(joint)]
+    motors = [name for joint in joints.values() if joint.is_actuated for name in list_joint_names(joint)]
     lists: dict[str, list[Any]] = {"closed_loop": pairs, "type": kinds, "name_mot": motors}
-    return Written((text(tree), "".join(f"{key}: {_yaml(names)}" for key, names in lists.items())), lost)
+    return Written(
+        (write_text(tree), "".join(f"{key}: {_format_yaml_list(names)}" for key, names in lists.items())), lost
+    )
 
 
-def _yaml(names: list[Any]) -> str:
+def _format_yaml_list(names: list[Any]) -> str:
     """Return a list as one line, every name in quotation marks."""
     import yaml
 

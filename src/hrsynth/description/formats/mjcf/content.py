@@ -8,13 +8,13 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from ....geometry.so3 import quaternions
-from ....geometry.vectors import Array, frozen, pose
+from ....geometry.so3 import convert_to_quaternions
+from ....geometry.vectors import Array, build_pose, freeze_array
 from ....mechanism.model import Mechanism, Note
 from ... import numerals, xml
-from ...contents import Content, Inertial, Solid, along_z, content_of, fragments, principal
+from ...contents import Content, Inertial, Solid, collect_content, find_principal_axes, rotate_z_to, write_fragments
 from ...elements import XmlReader
-from ...jointgraph import comma_list
+from ...jointgraph import join_names
 from .defaults import Compiler, Defaults
 
 _NAMES = {"box": "box", "sphere": "sphere", "cylinder": "cylinder", "capsule": "capsule"}
@@ -40,7 +40,7 @@ class BodyContents:
         for each in root.iterfind("asset/mesh"):
             given = self.defaults.of(each, None)
             if file := given.get("file"):
-                scale = _numbers(given.get("scale"), (1.0, 1.0, 1.0))
+                scale = _parse_numbers(given.get("scale"), (1.0, 1.0, 1.0))
                 self.meshes[given.get("name") or PurePosixPath(file).stem] = (
                     str(PurePosixPath(folder) / file),
                     scale or (1.0, 1.0, 1.0),
@@ -49,26 +49,29 @@ class BodyContents:
     def of(self, body: xml.Element, childclass: str | None) -> tuple[str, ...]:
         """Return the content of a body in URDF elements: a shape that is both visual and collision becomes two."""
         inertial, solids, before = None, list[Solid](), len(self.reader.defects)
-        for element in xml.children(body):
+        for element in xml.list_children(body):
             if element.tag == "inertial" and inertial is None:
                 inertial = self._inertial(element)
             elif element.tag == "geom":
                 solids += self._solids(element, self.defaults.of(element, childclass))
         del self.reader.defects[before:]
-        return fragments(Content(inertial, tuple(solids)))
+        return write_fragments(Content(inertial, tuple(solids)))
 
     def _place(self, element: xml.Element) -> Array | None:
         before = len(self.reader.defects)
         X = self.compiler.pose(element)
-        return None if len(self.reader.defects) > before else frozen(X)
+        return None if len(self.reader.defects) > before else freeze_array(X)
 
     def _inertial(self, element: xml.Element) -> Inertial | None:
-        mass, X = _numbers(element.get("mass"), (0.0,)), self._place(element)
-        six, three = _numbers(element.get("fullinertia"), (0.0,) * 6), _numbers(element.get("diaginertia"), (0.0,) * 3)
+        mass, X = _parse_numbers(element.get("mass"), (0.0,)), self._place(element)
+        six, three = (
+            _parse_numbers(element.get("fullinertia"), (0.0,) * 6),
+            _parse_numbers(element.get("diaginertia"), (0.0,) * 3),
+        )
         if mass is None or X is None or six is None or three is None:
             return None
         a, b, c, d, e, f = six if element.get("fullinertia") else (*three, 0.0, 0.0, 0.0)
-        inertia = frozen([[a, d, e], [d, b, f], [e, f, c]])
+        inertia = freeze_array([[a, d, e], [d, b, f], [e, f, c]])
         return Inertial(mass[0], X, inertia if np.any(inertia) else None)
 
     def _solids(self, element: xml.Element, given: Mapping[str, str]) -> list[Solid]:
@@ -77,19 +80,22 @@ class BodyContents:
         roles = (
             ["visual"]
             if given.get("contype") == given.get("conaffinity") == "0"
-            else (["collision"] if (_numbers(group, (0.0,)) or (0.0,))[0] >= 3 else ["visual", "collision"])
+            else (["collision"] if (_parse_numbers(group, (0.0,)) or (0.0,))[0] >= 3 else ["visual", "collision"])
         )
-        colour = _numbers(given.get("rgba", self.colours.get(given.get("material", "")) or None), (0.0,) * 4)
+        colour = _parse_numbers(given.get("rgba", self.colours.get(given.get("material", "")) or None), (0.0,) * 4)
         shown = given.get("rgba") or self.colours.get(given.get("material", ""))
-        sizes = _sizes(given.get("size", ""))
-        ends = _numbers(given.get("fromto"), (0.0,) * 6) if "fromto" in given else None
+        sizes = _parse_sizes(given.get("size", ""))
+        ends = _parse_numbers(given.get("fromto"), (0.0,) * 6) if "fromto" in given else None
         if X is None or (kind != "mesh" and kind not in _NAMES):
             return []
         if ends is not None and kind in ("cylinder", "capsule") and sizes:
             a, b = np.array(ends[:3]), np.array(ends[3:])
             if not np.linalg.norm(b - a) > 0:
                 return []
-            X, sizes = frozen(pose((a + b) / 2, along_z(b - a))), (sizes[0], float(np.linalg.norm(b - a)) / 2)
+            X, sizes = (
+                freeze_array(build_pose((a + b) / 2, rotate_z_to(b - a))),
+                (sizes[0], float(np.linalg.norm(b - a)) / 2),
+            )
         if kind == "mesh":
             if given.get("mesh") not in self.meshes:
                 return []
@@ -110,14 +116,14 @@ class BodyContents:
         ]
 
 
-def _sizes(text: str) -> tuple[float, ...]:
+def _parse_sizes(text: str) -> tuple[float, ...]:
     try:
         return tuple(float(v) for v in numerals.parse(text, len(text.split())))
     except ValueError:
         return ()
 
 
-def _numbers(text: str | None, default: tuple[float, ...]) -> tuple[float, ...] | None:
+def _parse_numbers(text: str | None, default: tuple[float, ...]) -> tuple[float, ...] | None:
     """Return the numbers of a text, the default if there is none, None if they are invalid."""
     if text is None:
         return default
@@ -127,47 +133,49 @@ def _numbers(text: str | None, default: tuple[float, ...]) -> tuple[float, ...] 
         return None
 
 
-def elements(robot: Mechanism) -> tuple[dict[str, list[xml.Element]], list[xml.Element], list[Note]]:
+def build_elements(robot: Mechanism) -> tuple[dict[str, list[xml.Element]], list[xml.Element], list[Note]]:
     """Return the elements of each body, the meshes as assets, and notes of content that MuJoCo does not accept."""
     assets: dict[tuple[str, tuple[float, ...]], str] = {}
     found: dict[str, list[xml.Element]] = {}
     names: set[str] = set()
     odd = []
     for link in robot.links.values():
-        content, own = content_of(link, robot), []
+        content, own = collect_content(link, robot), []
         if content.inertial is not None:
-            element = _inertial_element(content.inertial)
+            element = _build_inertial(content.inertial)
             if element is None:
                 odd.append(link.name)
             else:
                 own.append(element)
         for solid in content.solids:
-            own.append(_geom(solid, assets, names))
+            own.append(_build_geom(solid, assets, names))
         found[link.name] = own
     notes = (
-        [Note("warning", "masses and inertias that no body can have are not written: " + comma_list(odd))]
+        [Note("warning", "masses and inertias that no body can have are not written: " + join_names(odd))]
         if odd
         else []
     )
     meshes = [
-        xml.new("mesh", name=name, file=file)
+        xml.create_element("mesh", name=name, file=file)
         if scale == (1.0, 1.0, 1.0)
-        else xml.new("mesh", name=name, file=file, scale=numerals.exact_vector(scale))
+        else xml.create_element("mesh", name=name, file=file, scale=numerals.format_exact_vector(scale))
         for (file, scale), name in assets.items()
     ]
     return found, meshes, notes
 
 
-def _inertial_element(inertial: Inertial) -> xml.Element | None:
+def _build_inertial(inertial: Inertial) -> xml.Element | None:
     """Return the inertial element, None unless the mass is positive and each moment is at most the sum of the two
     others."""
     if not inertial.mass > 0:
         return None
-    element = xml.new("inertial", pos=numerals.exact_vector(inertial.X[:3, 3]), mass=numerals.exact(inertial.mass))
+    element = xml.create_element(
+        "inertial", pos=numerals.format_exact_vector(inertial.X[:3, 3]), mass=numerals.format_exact(inertial.mass)
+    )
     if inertial.inertia is None:
         element.set("diaginertia", "0 0 0")
         return element
-    moments, _ = principal(inertial.inertia)
+    moments, _ = find_principal_axes(inertial.inertia)
     least, middle, most = sorted(moments)
     if not (least > 0 and least + middle >= most):
         return None
@@ -177,12 +185,12 @@ def _inertial_element(inertial: Inertial) -> xml.Element | None:
     else:
         tensor = inertial.inertia
     six = (*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2])
-    element.set("fullinertia", numerals.exact_vector(six))
+    element.set("fullinertia", numerals.format_exact_vector(six))
     return element
 
 
-def _geom(solid: Solid, assets: dict[tuple[str, tuple[float, ...]], str], names: set[str]) -> xml.Element:
-    element = xml.new("geom", type=solid.kind, mass="0")
+def _build_geom(solid: Solid, assets: dict[tuple[str, tuple[float, ...]], str], names: set[str]) -> xml.Element:
+    element = xml.create_element("geom", type=solid.kind, mass="0")
     if solid.name and solid.name not in names:
         names.add(solid.name)
         element.set("name", solid.name)
@@ -195,15 +203,15 @@ def _geom(solid: Solid, assets: dict[tuple[str, tuple[float, ...]], str], names:
     else:
         sizes = solid.sizes
         half = {"box": tuple(size / 2 for size in sizes), "sphere": sizes}.get(solid.kind, (sizes[0], sizes[-1] / 2))
-        element.set("size", numerals.exact_vector(half))
+        element.set("size", numerals.format_exact_vector(half))
     if np.any(solid.X[:3, 3]):
-        element.set("pos", numerals.exact_vector(solid.X[:3, 3]))
+        element.set("pos", numerals.format_exact_vector(solid.X[:3, 3]))
     if not np.array_equal(solid.X[:3, :3], np.eye(3)):
-        element.set("quat", numerals.exact_vector(quaternions(solid.X[:3, :3])))
+        element.set("quat", numerals.format_exact_vector(convert_to_quaternions(solid.X[:3, :3])))
     if solid.role == "visual":
         element.set("contype", "0")
         element.set("conaffinity", "0")
         if solid.colour is not None:
-            element.set("rgba", numerals.exact_vector(solid.colour))
+            element.set("rgba", numerals.format_exact_vector(solid.colour))
     element.set("group", "2" if solid.role == "visual" else "3")
     return element

@@ -8,12 +8,12 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ....budgets import LARGEST_FILE, MOST_INCLUDES
+from ....budgets import INCLUDED_FILES_MAX, ROBOT_FILE_MAX_BYTES
 from ....errors import BadRobotFile
-from ....geometry.vectors import Array, pose, rotation_about
+from ....geometry.vectors import Array, build_pose, rotate_about_axis
 from ... import xml
 from ...elements import XmlReader
-from ...jointgraph import comma_list
+from ...jointgraph import join_names
 
 Layer: TypeAlias = dict[str, dict[str, str]]
 """Attributes that a class adds, by kind of element."""
@@ -32,14 +32,14 @@ class Defaults:
 
     def _read(self, element: xml.Element, inherited: tuple[Layer, ...], name: str) -> None:
         own = self._own.setdefault(name, {})
-        for child in xml.children(element):
+        for child in xml.list_children(element):
             if child.tag != "default":
-                own.setdefault(child.tag, {}).update(_attributes(child))
+                own.setdefault(child.tag, {}).update(_collect_attributes(child))
         self.classes[name] = inherited if any(layer is own for layer in inherited) else (*inherited, own)
         for child in element.findall("default"):
             inner = child.get("class")
             if inner is None:
-                self.reader.defect(xml.line(child), "<default> without class")
+                self.reader.defect(xml.get_line(child), "<default> without class")
             else:
                 self._read(child, self.classes[name], inner)
 
@@ -55,12 +55,14 @@ class Defaults:
         """Return the attributes of an element with those of its class, its own first."""
         name = element.get("class") or childclass or "main"
         if name not in self.classes:
-            self.reader.defect(xml.line(element), "unknown default class", name, comma_list(self.classes, like=name))
+            self.reader.defect(
+                xml.get_line(element), "unknown default class", name, join_names(self.classes, like=name)
+            )
             name = "main"
-        return {**self._of_class(name, tag or str(element.tag)), **_attributes(element)}
+        return {**self._of_class(name, tag or str(element.tag)), **_collect_attributes(element)}
 
 
-def _attributes(element: xml.Element) -> dict[str, str]:
+def _collect_attributes(element: xml.Element) -> dict[str, str]:
     return {str(key): str(value) for key, value in element.attrib.items()}
 
 
@@ -79,12 +81,12 @@ class Compiler:
         for element in reader.root.findall("compiler"):
             unit, sequence = element.get("angle"), element.get("eulerseq", found.sequence)
             if unit not in (None, "degree", "radian"):
-                reader.defect(xml.line(element), "angle of <compiler>", unit, "degree or radian")
+                reader.defect(xml.get_line(element), "angle of <compiler>", unit, "degree or radian")
             if len(sequence) != 3 or set(sequence.lower()) - set("xyz"):
-                reader.defect(xml.line(element), "eulerseq of <compiler>", sequence, "three of x, y, z, X, Y, Z")
+                reader.defect(xml.get_line(element), "eulerseq of <compiler>", sequence, "three of x, y, z, X, Y, Z")
                 sequence = "xyz"
             if element.get("coordinate", "local") != "local":
-                reader.defect(xml.line(element), "coordinate of <compiler>", element.get("coordinate"), "local")
+                reader.defect(xml.get_line(element), "coordinate of <compiler>", element.get("coordinate"), "local")
             found = cls(reader, found.degrees if unit is None else unit == "degree", sequence)
         return found
 
@@ -94,7 +96,7 @@ class Compiler:
 
     def pose(self, element: xml.Element) -> Array:
         """Return the pose (4, 4) of an element with ``pos`` and any form of orientation."""
-        return pose(self.reader.numbers(element, "pos", (0, 0, 0)), self._orientation(element))
+        return build_pose(self.reader.numbers(element, "pos", (0, 0, 0)), self._orientation(element))
 
     def _orientation(self, element: xml.Element) -> Array | None:
         reader = self.reader
@@ -102,40 +104,40 @@ class Compiler:
             return reader.rotation(element, reader.numbers(element, "quat", (1, 0, 0, 0)))
         if element.get("axisangle") is not None:
             values = reader.numbers(element, "axisangle", (0, 0, 1, 0))
-            return rotation_about(self._direction(element, values[:3]), self.angle(values[3]))
+            return rotate_about_axis(self._direction(element, values[:3]), self.angle(values[3]))
         if element.get("xyaxes") is not None:
             values = reader.numbers(element, "xyaxes", (1, 0, 0, 0, 1, 0))
             x = self._direction(element, values[:3])
             y = self._direction(element, values[3:] - x * float(x @ values[3:]))
             return np.column_stack((x, y, np.cross(x, y)))
         if element.get("zaxis") is not None:
-            return _least_turn(self._direction(element, reader.numbers(element, "zaxis", (0, 0, 1))))
+            return _find_least_rotation(self._direction(element, reader.numbers(element, "zaxis", (0, 0, 1))))
         if element.get("euler") is not None:
             return self._euler([self.angle(v) for v in reader.numbers(element, "euler", (0, 0, 0))])
         return None
 
     def _direction(self, element: xml.Element, values: Array) -> Array:
-        return self.reader.unit(values, xml.line(element), "a direction of length zero")
+        return self.reader.unit(values, xml.get_line(element), "a direction of length zero")
 
     def _euler(self, angles: list[float]) -> Array:
         """Return a rotation: lower case about the rotated axes, upper case about the fixed ones."""
         R = np.eye(3)
         for letter, angle in zip(self.sequence, angles, strict=True):
-            turn = rotation_about(np.eye(3)["xyz".index(letter.lower())], angle)
+            turn = rotate_about_axis(np.eye(3)["xyz".index(letter.lower())], angle)
             R = R @ turn if letter.islower() else turn @ R
         return R
 
 
-def _least_turn(z: Array) -> Array:
+def _find_least_rotation(z: Array) -> Array:
     """Return the smallest rotation that takes the z axis to ``z``."""
     axis = np.cross([0.0, 0.0, 1.0], z)
     sine = float(np.linalg.norm(axis))
     if sine < 1e-12:
-        return np.eye(3) if z[2] > 0 else rotation_about((1, 0, 0), np.pi)
-    return rotation_about(axis, float(np.arctan2(sine, z[2])))
+        return np.eye(3) if z[2] > 0 else rotate_about_axis((1, 0, 0), np.pi)
+    return rotate_about_axis(axis, float(np.arctan2(sine, z[2])))
 
 
-def with_includes(root: xml.Element, file: str) -> xml.Element:
+def expand_includes(root: xml.Element, file: str) -> xml.Element:
     """Return the document with every ``<include>`` replaced by the content of its file; only files in the folder of the
     main one and below it are read, none twice. Raises ``BadRobotFile``."""
     folder = Path(file).resolve().parent
@@ -145,7 +147,7 @@ def with_includes(root: xml.Element, file: str) -> xml.Element:
         name = element.get("file") or ""
 
         def refuse(what: str, allowed: str, at: xml.Element = element, value: str = name) -> BadRobotFile:
-            return xml.refusal(at.base or file, what, allowed, value=value, line=xml.line(at))
+            return xml.make_file_error(at.base or file, what, allowed, value=value, line=xml.get_line(at))
 
         try:
             path = (folder / name).resolve()
@@ -153,22 +155,22 @@ def with_includes(root: xml.Element, file: str) -> xml.Element:
             raise refuse("<include>: not a file", "a file in the model's folder") from None
         if not name or not path.is_relative_to(folder):
             raise refuse("<include>: outside of the model's folder", "a file in the model's folder")
-        if path in read or len(read) > MOST_INCLUDES:
-            raise refuse("<include>: repeated file, or too many files", f"each once, up to {MOST_INCLUDES}")
+        if path in read or len(read) > INCLUDED_FILES_MAX:
+            raise refuse("<include>: repeated file, or too many files", f"each once, up to {INCLUDED_FILES_MAX}")
         read.add(path)
         try:
-            content = xml.content(path)
+            content = xml.read_bytes(path)
         except BadRobotFile as error:
             raise refuse(f"<include>: {error.defects[0].problem}", "a file in the model's folder") from None
         size += len(content)
-        if size > LARGEST_FILE:
-            raise refuse("<include>: files too large", f"up to {LARGEST_FILE} bytes together")
-        parent, included = element.getparent(), xml.document(content, str(path))
+        if size > ROBOT_FILE_MAX_BYTES:
+            raise refuse("<include>: files too large", f"up to {ROBOT_FILE_MAX_BYTES} bytes together")
+        parent, included = element.getparent(), xml.parse_document(content, str(path))
         if parent is None:
             raise refuse("<include> in place of the model", "<mujoco>")
         place = parent.index(element)
         parent.remove(element)
-        for child in reversed(xml.children(included)):
+        for child in reversed(xml.list_children(included)):
             child.base = str(path)
             parent.insert(place, child)
     return root

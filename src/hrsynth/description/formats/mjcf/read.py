@@ -6,17 +6,17 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ....geometry.vectors import Array, frozen, inverse, pose
-from ....mechanism.model import JointType, Limits, Link, Motor, fresh_name
+from ....geometry.vectors import Array, build_pose, freeze_array, invert_pose
+from ....mechanism.model import JointType, Limits, Link, Motor, make_fresh_name
 from ... import numerals, xml
 from ...annotations import PREFIX, drop_world, read_annotation
 from ...elements import XmlReader
 from ...file_format import RobotFile
-from ...jointgraph import ORIGIN, CouplingSpec, FrameSpec, JointGraph, JointSpec, comma_list
-from ...keyframes import from_keyframe
-from ..paired import onshape_pairs, other_pairs
+from ...jointgraph import ORIGIN, CouplingSpec, FrameSpec, JointGraph, JointSpec, join_names
+from ...keyframes import convert_keyframe
+from ..paired import join_named_pairs, join_onshape_pairs
 from .content import BodyContents
-from .defaults import Compiler, Defaults, with_includes
+from .defaults import Compiler, Defaults, expand_includes
 from .names import NAMES
 
 WORLD = "world"
@@ -31,7 +31,7 @@ _TYPES = {
 def read(file: RobotFile) -> JointGraph:
     """Return the joint graph of an MJCF document. Raises ``BadRobotFile`` with all its defects."""
     name = str(file.path)
-    root = with_includes(file.document, name)
+    root = expand_includes(file.document, name)
     defects, notes = NAMES.check(root, file)
     graph = _MjcfReader(name, root, defects).graph()
     graph.notes[:0] = notes
@@ -66,27 +66,27 @@ class _MjcfReader(XmlReader):
         self.require_sound()
         self._keyframes()
         for section in root.findall("equality"):
-            for element in xml.children(section):
+            for element in xml.list_children(section):
                 self._equality(element)
         if all(joint.in_tree for joint in graph.joints.values()):
-            frames = {name: FrameSpec(link, frozen(X)) for name, (link, X) in self.sites.items()}
-            onshape_pairs(self, graph, frames)
-            other_pairs(graph, frames)
+            frames = {name: FrameSpec(link, freeze_array(X)) for name, (link, X) in self.sites.items()}
+            join_onshape_pairs(self, graph, frames)
+            join_named_pairs(graph, frames)
         for section in root.findall("actuator"):
-            for element in xml.children(section):
+            for element in xml.list_children(section):
                 self._actuator(element)
         for element in root.iterfind("custom/text"):
             name = element.get("name", "")
             if name.startswith(PREFIX + "_"):
                 wrong = read_annotation(graph, name.split("_")[1], element.get("data", ""))
                 if wrong is not None:
-                    self.defect(xml.line(element), wrong, element.get("data"))
+                    self.defect(xml.get_line(element), wrong, element.get("data"))
         self.require_sound()
         return drop_world(graph)
 
     def _children(self, element: xml.Element, link: str, childclass: str | None, X: Array) -> None:
         """Read the sites, frames and bodies in a body or frame; ``X`` is the frame's pose in the body ``link``."""
-        for child in xml.children(element):
+        for child in xml.list_children(element):
             if child.tag == "site" and child.get("name"):
                 self.sites[child.get("name", "")] = (link, X @ self.compiler.pose(child))
             elif child.tag == "frame":
@@ -94,21 +94,21 @@ class _MjcfReader(XmlReader):
             elif child.tag == "body":
                 self._body(child, link, child.get("childclass", childclass), X @ self.compiler.pose(child))
             elif child.tag in ("replicate", "attach", "composite", "flexcomp"):
-                self.defect(xml.line(child), f"<{child.tag}> is not read", None, "bodies written out")
+                self.defect(xml.get_line(child), f"<{child.tag}> is not read", None, "bodies written out")
 
     def _body(self, element: xml.Element, parent: str, childclass: str | None, X_PB: Array) -> None:
         graph = self.result
         name = element.get("name") or self._fresh("body")
         if name in graph.links:
-            self.defect(xml.line(element), "second body of the same name", name)
+            self.defect(xml.get_line(element), "second body of the same name", name)
             return
-        graph.links[name] = Link(name, xml=self.contents.of(element, childclass), line=xml.line(element))
+        graph.links[name] = Link(name, xml=self.contents.of(element, childclass), line=xml.get_line(element))
         self.placed[name] = self.placed[parent] @ X_PB
-        joints = [child for child in xml.children(element) if child.tag in ("joint", "freejoint")]
+        joints = [child for child in xml.list_children(element) if child.tag in ("joint", "freejoint")]
         if not joints:
             title = self._fresh(f"{name}_fixed")
             ends = FrameSpec(parent, X_PB), FrameSpec(name)
-            graph.joints[title] = JointSpec(title, JointType.FIXED, ends, line=xml.line(element))
+            graph.joints[title] = JointSpec(title, JointType.FIXED, ends, line=xml.get_line(element))
         before, X = parent, X_PB
         for number, joint in enumerate(joints):
             before, X = self._joint(joint, before, X, name, childclass, last=number == len(joints) - 1)
@@ -123,35 +123,35 @@ class _MjcfReader(XmlReader):
         name = element.get("name") or self._fresh(f"{body}_joint")
         kind = JointType.FREE if element.tag == "freejoint" else _TYPES.get(given.get("type", "hinge"))
         if kind is None:
-            self.defect(xml.line(element), "unknown joint type", given.get("type"), ", ".join(_TYPES))
+            self.defect(xml.get_line(element), "unknown joint type", given.get("type"), ", ".join(_TYPES))
             return before, X
         if name in graph.joints:
-            self.defect(xml.line(element), "second joint of the same name", name)
+            self.defect(xml.get_line(element), "second joint of the same name", name)
             return before, X
         after = body
         if not last:
-            after = fresh_name(name, graph.links, self.bodies)
-            graph.links[after] = Link(after, line=xml.line(element))
+            after = make_fresh_name(name, graph.links, self.bodies)
+            graph.links[after] = Link(after, line=xml.get_line(element))
             self.placed[after] = self.placed[body]
         centre = self._numbers(element, given, "pos", (0, 0, 0)) if kind is not JointType.FREE else np.zeros(3)
         axes: tuple[Array, ...] = ()
         if kind.axes:
             vector = self._numbers(element, given, "axis", (0, 0, 1))
-            axes = (self.unit(vector, xml.line(element), f"axis of joint {name!r}", "0 0 0"),)
-        at = pose(centre)
+            axes = (self.unit(vector, xml.get_line(element), f"axis of joint {name!r}", "0 0 0"),)
+        at = build_pose(centre)
         self.zeros[name] = self._angle(element, given, "ref", kind)
-        ends = FrameSpec(before, frozen(X @ at), xml.line(element)), FrameSpec(after, frozen(at))
+        ends = FrameSpec(before, freeze_array(X @ at), xml.get_line(element)), FrameSpec(after, freeze_array(at))
         graph.joints[name] = JointSpec(
-            name, kind, ends, axes, self._limits(element, given, name, kind), line=xml.line(element)
+            name, kind, ends, axes, self._limits(element, given, name, kind), line=xml.get_line(element)
         )
         return after, ORIGIN
 
     def _fresh(self, name: str) -> str:
         """Return a name that nothing in the document has."""
-        return fresh_name(name, self.result.links, self.result.joints, self.named)
+        return make_fresh_name(name, self.result.links, self.result.joints, self.named)
 
     def _numbers(self, element: xml.Element, given: dict[str, str], key: str, default: tuple[float, ...]) -> Array:
-        return self.values(given.get(key), default, xml.line(element), f"{key} of <{element.tag}>")
+        return self.values(given.get(key), default, xml.get_line(element), f"{key} of <{element.tag}>")
 
     def _angle(self, element: xml.Element, given: dict[str, str], key: str, kind: JointType) -> float:
         value = float(self._numbers(element, given, key, (0,))[0])
@@ -170,16 +170,16 @@ class _MjcfReader(XmlReader):
     def _equality(self, element: xml.Element) -> None:
         graph, given = self.result, self.defaults.of(element, None, "equality")
         said = element.get("name")  # which bodies and equalities may share
-        name = fresh_name(said, graph.joints) if said else graph.fresh(str(element.tag))
+        name = make_fresh_name(said, graph.joints) if said else graph.fresh(str(element.tag))
         if given.get("active", "true") == "false":
             graph.note("ignored", f"the inactive equality {name!r}{self._wish(element, given)}")
         elif element.tag in ("connect", "weld"):
             ends = self._ends(element, given)
             if ends is not None and ends[0].link != ends[1].link:
                 kind = JointType.SPHERICAL if element.tag == "connect" else JointType.FIXED
-                graph.close(name, kind, ends, line=xml.line(element))
+                graph.close(name, kind, ends, line=xml.get_line(element))
             elif ends is not None:
-                self.defect(xml.line(element), f"{element.tag} {name!r} connects a body to itself", ends[0].link)
+                self.defect(xml.get_line(element), f"{element.tag} {name!r} connects a body to itself", ends[0].link)
         elif element.tag == "joint":
             self._gear(element, given, name)
         else:
@@ -194,12 +194,12 @@ class _MjcfReader(XmlReader):
             return ""
         return (
             " (--close "
-            + ":".join(f"{end.link}@{numerals.exact_vector(end.X[:3, 3]).replace(' ', ',')}" for end in ends)
+            + ":".join(f"{end.link}@{numerals.format_exact_vector(end.X[:3, 3]).replace(' ', ',')}" for end in ends)
             + " closes it)"
         )
 
     def _ends(self, element: xml.Element, given: dict[str, str]) -> tuple[FrameSpec, FrameSpec] | None:
-        line = xml.line(element)
+        line = xml.get_line(element)
         if "site1" in given or "site2" in given:
             sites = [self.sites.get(given.get(key, "")) for key in ("site1", "site2")]
             if sites[0] is None or sites[1] is None:
@@ -207,38 +207,38 @@ class _MjcfReader(XmlReader):
                     line,
                     f"{element.tag} of unknown sites",
                     " ".join(given.get(k, "?") for k in ("site1", "site2")),
-                    comma_list(self.sites) or "a <site> of each name",
+                    join_names(self.sites) or "a <site> of each name",
                 )
                 return None
             return FrameSpec(*sites[0], line), FrameSpec(*sites[1], line)
         names = [given.get("body1"), given.get("body2", WORLD)]
         for body in names:
             if body not in self.placed:
-                self.defect(line, f"{element.tag} of an unknown body", body, comma_list(self.placed, like=body))
+                self.defect(line, f"{element.tag} of an unknown body", body, join_names(self.placed, like=body))
         if any(body not in self.placed for body in names):
             return None
         one, two = (self.placed[str(body)] for body in names)
         if element.tag == "connect":
-            X = pose(self._numbers(element, given, "anchor", (0, 0, 0)))
-            Y = pose((inverse(two) @ one @ X)[:3, 3])
+            X = build_pose(self._numbers(element, given, "anchor", (0, 0, 0)))
+            Y = build_pose((invert_pose(two) @ one @ X)[:3, 3])
         else:
             relative = self._numbers(element, given, "relpose", (0, 1, 0, 0, 0, 0, 0))
-            Y = pose(self._numbers(element, given, "anchor", (0, 0, 0)))
-            X = inverse(one) @ two @ Y
+            Y = build_pose(self._numbers(element, given, "anchor", (0, 0, 0)))
+            X = invert_pose(one) @ two @ Y
             if np.any(relative[3:]):
-                X = pose(relative[:3], self.rotation(element, relative[3:]))
-        return FrameSpec(str(names[0]), frozen(X), line), FrameSpec(str(names[1]), frozen(Y), line)
+                X = build_pose(relative[:3], self.rotation(element, relative[3:]))
+        return FrameSpec(str(names[0]), freeze_array(X), line), FrameSpec(str(names[1]), freeze_array(Y), line)
 
     def _gear(self, element: xml.Element, given: dict[str, str], name: str) -> None:
         """y − y₀ = a₀ + a₁ (x − x₀): add a coupling; without a second joint the first is fixed."""
-        graph, line = self.result, xml.line(element)
+        graph, line = self.result, xml.get_line(element)
         driven, driver = given.get("joint1"), given.get("joint2")
         words = given.get("polycoef", "0 1 0 0 0").split()
         coefficients = self._numbers(element, {"polycoef": " ".join((words + ["0"] * 5)[:5])}, "polycoef", (0,) * 5)
         for joint in (driven, driver):
             if joint is not None and joint not in graph.joints:
                 self.defect(
-                    line, f"joint equality {name!r}: unknown joint", joint, comma_list(graph.joints, like=joint)
+                    line, f"joint equality {name!r}: unknown joint", joint, join_names(graph.joints, like=joint)
                 )
         if driven not in graph.joints or (driver is not None and driver not in graph.joints):
             return
@@ -259,7 +259,7 @@ class _MjcfReader(XmlReader):
             name, words = key.get("name") or str(number), key.get("qpos")
             try:
                 qpos = None if words is None else numerals.parse(words, len(words.split()))
-                found = {} if qpos is None else from_keyframe(joints, self.zeros, qpos)
+                found = {} if qpos is None else convert_keyframe(joints, self.zeros, qpos)
             except ValueError:
                 found = None
             if found is None:
@@ -274,6 +274,8 @@ class _MjcfReader(XmlReader):
         if joint is None:
             graph.note("ignored", f"the actuator {element.get('name')!r}, which drives no joint")
         elif joint not in graph.joints:
-            self.defect(xml.line(element), "actuator of an unknown joint", joint, comma_list(graph.joints, like=joint))
+            self.defect(
+                xml.get_line(element), "actuator of an unknown joint", joint, join_names(graph.joints, like=joint)
+            )
         elif graph.joints[joint].motor is None:
             graph.joints[joint] = replace(graph.joints[joint], motor=Motor(name))

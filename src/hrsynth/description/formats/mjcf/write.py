@@ -7,18 +7,18 @@ from collections.abc import Mapping
 import numpy as np
 from lxml import etree
 
-from ....geometry.so3 import quaternions
-from ....geometry.vectors import Array, inverse
+from ....geometry.so3 import convert_to_quaternions
+from ....geometry.vectors import Array, invert_pose
 from ....mechanism.model import Joint, JointType, Mechanism, Note
 from ... import numerals, xml
-from ...annotations import PREFIX, annotations_of
+from ...annotations import PREFIX, list_annotations
 from ...chains import SECOND
-from ...contents import SIZES, unsaid
+from ...contents import SIZES, list_unsupported_content
 from ...file_format import Written
-from ...jointgraph import comma_list
+from ...jointgraph import join_names
 from ...reduction import reduce, require_free_world
-from ...tree import outward
-from .content import elements
+from ...tree import list_outward_joints
+from .content import build_elements
 
 _TREE = (JointType.REVOLUTE, JointType.PRISMATIC, JointType.SPHERICAL, JointType.FIXED)
 _LOOPS = (JointType.SPHERICAL, JointType.FIXED, JointType.REVOLUTE)
@@ -38,33 +38,38 @@ def write(mechanism: Mechanism) -> Written:
     robot, lost = reduce(mechanism, (*_TREE, JointType.FREE) if floats else _TREE, _LOOPS)
     require_free_world(robot, WORLD, "MJCF")
     custom = [
-        xml.new("text", name=f"{PREFIX}_{key}_{number}", data=text)
-        for number, (key, text) in enumerate(annotations_of(robot), 1)
+        xml.create_element("text", name=f"{PREFIX}_{key}_{number}", data=text)
+        for number, (key, text) in enumerate(list_annotations(robot), 1)
     ]
-    loops = [element for joint in robot.joints.values() if not joint.in_tree for element in _closure(robot, joint)]
+    loops = [
+        element for joint in robot.joints.values() if not joint.in_tree for element in _build_closure(robot, joint)
+    ]
     motors = [
-        xml.new("motor", name=joint.motor.name, joint=joint.name)
+        xml.create_element("motor", name=joint.motor.name, joint=joint.name)
         for joint in robot.joints.values()
         if joint.motor is not None and joint.type is not JointType.FIXED
     ]
-    inner, assets, odd = elements(robot)
+    inner, assets, odd = build_elements(robot)
     sections = {
         "custom": custom,
         "asset": assets,
-        "worldbody": _bodies(robot, inner),
-        "equality": [*loops, *_gears(robot)],
+        "worldbody": _build_bodies(robot, inner),
+        "equality": [*loops, *_build_couplings(robot)],
         "actuator": motors,
     }
-    root = xml.new(
+    root = xml.create_element(
         "mujoco",
-        xml.new("compiler", angle="radian", boundmass="0.001", boundinertia="0.000001"),
-        *(xml.new(tag, *elements) for tag, elements in sections.items() if elements),
+        xml.create_element("compiler", angle="radian", boundmass="0.001", boundinertia="0.000001"),
+        *(xml.create_element(tag, *elements) for tag, elements in sections.items() if elements),
         model=robot.name,
     )
-    return Written((xml.text_of(root),), (*lost, *_notes_on_losses(robot), *odd, *unsaid(robot, SIZES, dialect="MJCF")))
+    return Written(
+        (xml.format_document(root),),
+        (*lost, *_list_losses(robot), *odd, *list_unsupported_content(robot, SIZES, dialect="MJCF")),
+    )
 
 
-def _notes_on_losses(robot: Mechanism) -> list[Note]:
+def _list_losses(robot: Mechanism) -> list[Note]:
     """Return notes of what MJCF cannot express: one-sided limits, limits of loops, of velocity and force, names of
     fixed joints."""
     found = []
@@ -82,80 +87,89 @@ def _notes_on_losses(robot: Mechanism) -> list[Note]:
     }
     for what, joints in lost.items():
         if joints:
-            found.append(Note("warning", f"{what} are not written: {comma_list([joint.name for joint in joints])}"))
+            found.append(Note("warning", f"{what} are not written: {join_names([joint.name for joint in joints])}"))
     fixed = [joint.name for joint in robot.joints.values() if joint.in_tree and joint.type is JointType.FIXED]
     if fixed:
-        found.append(Note("warning", "the names of fixed joints are not written: " + comma_list(fixed)))
+        found.append(Note("warning", "the names of fixed joints are not written: " + join_names(fixed)))
     return found
 
 
-def _bodies(robot: Mechanism, inner: Mapping[str, list[xml.Element]]) -> list[xml.Element]:
+def _build_bodies(robot: Mechanism, inner: Mapping[str, list[xml.Element]]) -> list[xml.Element]:
     """Return the bodies that the world carries, each holding its own elements and the bodies that it carries."""
-    world = xml.new("worldbody")
+    world = xml.create_element("worldbody")
     bodies = {robot.base: world}
     if robot.base != WORLD:
         bodies[robot.base] = etree.SubElement(world, "body", name=robot.base)
     bodies[robot.base].extend(each for each in inner[robot.base] if robot.base != WORLD or each.tag == "geom")
-    for joint in outward(robot):
-        X = inverse(robot.links[joint.predecessor].pose) @ robot.links[joint.successor].pose
-        body = xml.new("body", name=joint.successor)
+    for joint in list_outward_joints(robot):
+        X = invert_pose(robot.links[joint.predecessor].pose) @ robot.links[joint.successor].pose
+        body = xml.create_element("body", name=joint.successor)
         if np.any(X[:3, 3]):
-            body.set("pos", numerals.exact_vector(X[:3, 3]))
+            body.set("pos", numerals.format_exact_vector(X[:3, 3]))
         if not np.array_equal(X[:3, :3], np.eye(3)):
-            body.set("quat", numerals.exact_vector(quaternions(X[:3, :3])))
+            body.set("quat", numerals.format_exact_vector(convert_to_quaternions(X[:3, :3])))
         if joint.type is not JointType.FIXED:
-            body.append(_joint(robot, joint))
+            body.append(_build_joint(robot, joint))
         body.extend(inner[joint.successor])
         (world if joint.type is JointType.FREE else bodies[joint.predecessor]).append(body)
         bodies[joint.successor] = body
     return list(world)
 
 
-def _joint(robot: Mechanism, joint: Joint) -> xml.Element:
+def _build_joint(robot: Mechanism, joint: Joint) -> xml.Element:
     if joint.type is JointType.FREE:
-        return xml.new("freejoint", name=joint.name)
-    element = xml.new("joint", name=joint.name, type=_NAMES[joint.type], pos=_at(robot, joint.successor, joint.point))
+        return xml.create_element("freejoint", name=joint.name)
+    element = xml.create_element(
+        "joint", name=joint.name, type=_NAMES[joint.type], pos=_format_point(robot, joint.successor, joint.point)
+    )
     if joint.axes:
-        element.set("axis", numerals.exact_vector(robot.links[joint.successor].pose[:3, :3].T @ joint.axis))
+        element.set("axis", numerals.format_exact_vector(robot.links[joint.successor].pose[:3, :3].T @ joint.axis))
     limits = joint.limits
     if limits is not None and limits.lower is not None and limits.upper is not None and limits.lower < limits.upper:
-        element.set("range", numerals.exact_vector((limits.lower, limits.upper)))
+        element.set("range", numerals.format_exact_vector((limits.lower, limits.upper)))
     return element
 
 
-def _at(robot: Mechanism, link: str, point: Array) -> str:
+def _format_point(robot: Mechanism, link: str, point: Array) -> str:
     """Return a point in the frame of a link."""
-    X = inverse(robot.links[link].pose)
-    return numerals.exact_vector(X[:3, :3] @ point + X[:3, 3])
+    X = invert_pose(robot.links[link].pose)
+    return numerals.format_exact_vector(X[:3, :3] @ point + X[:3, 3])
 
 
-def _closure(robot: Mechanism, joint: Joint) -> list[xml.Element]:
+def _build_closure(robot: Mechanism, joint: Joint) -> list[xml.Element]:
     """Return a rigid closure as a weld, a point as a point, a revolute joint as two points."""
     one, two = joint.links
     if joint.type is JointType.FIXED:
-        relative = inverse(robot.links[one].pose) @ robot.links[two].pose
-        relpose = f"{_at(robot, one, joint.point)} {numerals.exact_vector(quaternions(relative[:3, :3]))}"
+        relative = invert_pose(robot.links[one].pose) @ robot.links[two].pose
+        relpose = f"{_format_point(robot, one, joint.point)} {numerals.format_exact_vector(convert_to_quaternions(relative[:3, :3]))}"
         return [
-            xml.new("weld", name=joint.name, body1=one, body2=two, relpose=relpose, anchor=_at(robot, two, joint.point))
+            xml.create_element(
+                "weld",
+                name=joint.name,
+                body1=one,
+                body2=two,
+                relpose=relpose,
+                anchor=_format_point(robot, two, joint.point),
+            )
         ]
     points = {joint.name: joint.point}
     if joint.type is JointType.REVOLUTE:
         points[joint.name + SECOND] = joint.point + robot.length * joint.axis
     return [
-        xml.new("connect", name=name, body1=one, body2=two, anchor=_at(robot, one, point))
+        xml.create_element("connect", name=name, body1=one, body2=two, anchor=_format_point(robot, one, point))
         for name, point in points.items()
     ]
 
 
-def _gears(robot: Mechanism) -> list[xml.Element]:
+def _build_couplings(robot: Mechanism) -> list[xml.Element]:
     carrier = {joint.successor: joint.name for joint in robot.joints.values() if joint.in_tree}
     return [
-        xml.new(
+        xml.create_element(
             "joint",
             name=each.name,
             joint1=carrier[each.successor],
             joint2=carrier[each.predecessor],
-            polycoef=numerals.exact_vector((0, each.ratio, 0, 0, 0)),
+            polycoef=numerals.format_exact_vector((0, each.ratio, 0, 0, 0)),
         )
         for each in robot.couplings
     ]

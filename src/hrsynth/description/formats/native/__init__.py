@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from ...file_format import FileFormat, RobotFile
 from .read import parse
-from .write import text as write
+from .write import write_text as write
 
 __all__ = ["DIALECT", "parse", "write"]
 
 
-def _knows(file: RobotFile) -> bool:
-    return file.tag == "robot" and file.strict and file.has("hrsynth")
+def _is_native_file(file: RobotFile) -> bool:
+    return file.tag == "robot" and file.strict and file.has_child("hrsynth")
 
 
-DIALECT = FileFormat("native", _knows, (".urdf",), rank=1)
+DIALECT = FileFormat("native", _is_native_file, (".urdf",), rank=1)

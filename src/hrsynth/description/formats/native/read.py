@@ -15,14 +15,14 @@ from ....mechanism import graphs
 from ....mechanism.cameras import NamedCamera
 from ....mechanism.model import FIRST, NAMED, Joint, JointType, Limits, Mechanism, Motor
 from ....mechanism.observations.direction import Direction
-from ....tolerances import NO_FINER, SAME_DIRECTION, SAME_GEOMETRY
+from ....tolerances import DIRECTION_SINE_TOL, GEOMETRY_DIFFERENCE_TOL, TOLERANCE_AMBIGUITY_FRACTION
 from ... import chains, xml
 from ...elements import LIMITS, TURNS
 from ...file_format import RobotFile
-from ...jointgraph import JointSpec, TreeJoint, first_body, zero_poses
-from ...jointmotion import require_closed, residual
-from ...observation_text import ObservationSpec, as_written
-from ..urdf.elements import INTERFACE, UrdfReader, is_sight, simple_transmission
+from ...jointgraph import JointSpec, TreeJoint, compute_zero_poses, find_first_body
+from ...jointmotion import compute_closure_residual, require_closed
+from ...observation_text import ObservationSpec, add_file_observations
+from ..urdf.elements import INTERFACE, UrdfReader, build_transmission, is_sight
 from ..urdf.names import NAMES
 
 OWN_TAGS = ("platform", "camera", "observe")
@@ -38,7 +38,7 @@ def read(file: RobotFile) -> Mechanism:
     ------
     BadRobotFile
         With every defect of the file and its line.
-    LoopsNotClosed
+    LoopClosureFailure
         If a loop is open at the zero configuration.
     """
     root = file.document
@@ -51,7 +51,7 @@ def read(file: RobotFile) -> Mechanism:
 
 def parse(text: bytes | str, file: str = "<text>") -> Mechanism:
     """Return the mechanism of a text; ``file`` is named in its defects."""
-    return _NativeReader(file, xml.document(text, file)).mechanism()
+    return _NativeReader(file, xml.parse_document(text, file)).mechanism()
 
 
 @dataclass
@@ -71,12 +71,12 @@ class _NativeReader(UrdfReader):
     def mechanism(self) -> Mechanism:
         root = self.root
         if root.tag != "robot":
-            self.defect(xml.line(root), "root element", str(root.tag), "robot")
+            self.defect(xml.get_line(root), "root element", str(root.tag), "robot")
             raise BadRobotFile(self.defects)
         name = self.attribute(root, "name") or "robot"
         self.elements()
         self.own(root.findall("hrsynth"))
-        self.rest[:0] = xml.unknown(root, ["name"], [*ELSEWHERE, "hrsynth"])
+        self.rest[:0] = xml.list_unknown(root, ["name"], [*ELSEWHERE, "hrsynth"])
         base = self.structure()
         if self.defects or base is None or self.platform is None:
             raise BadRobotFile(self.defects)
@@ -93,7 +93,7 @@ class _NativeReader(UrdfReader):
                 values[key] = float(self.numbers(limit, key, (0,))[0])
         for key in ("velocity", "effort"):
             if values.get(key, 0.0) < 0:
-                self.defect(xml.line(limit), f"{key} of <limit>", limit.get(key), "a number of at least 0")
+                self.defect(xml.get_line(limit), f"{key} of <limit>", limit.get(key), "a number of at least 0")
         if kind == "continuous":
             values.pop("lower", None)
             values.pop("upper", None)
@@ -102,40 +102,44 @@ class _NativeReader(UrdfReader):
                 if key not in free:
                     values.setdefault(key, 0.0)
         if values.get("lower", -np.inf) > values.get("upper", np.inf):
-            self.defect(xml.line(limit), "lower limit", f"{values['lower']:g}", f"up to {values['upper']:g}")
+            self.defect(xml.get_line(limit), "lower limit", f"{values['lower']:g}", f"up to {values['upper']:g}")
         return Limits(**values) if values else None
 
     def transmission(self, element: xml.Element) -> None:
         name = self.attribute(element, "name")
         targets = element.findall("joint")
         if not targets:
-            self.defect(xml.line(element), "transmission without <joint>", element.get("name"))
+            self.defect(xml.get_line(element), "transmission without <joint>", element.get("name"))
         joints = self.joints
         for joint in targets:
             target = self.attribute(joint, "name")
             if target is None:
                 continue
             planar = self.planar_parts(target)
-            if not planar and not self.check_link(target, xml.line(joint), "transmission of an unknown joint", joints):
+            if not planar and not self.is_known_link(
+                target, xml.get_line(joint), "transmission of an unknown joint", joints
+            ):
                 continue
             for each in planar or [target]:
                 if joints[each].type is JointType.FIXED:
-                    self.defect(xml.line(joint), "transmission of a fixed joint", target)
+                    self.defect(xml.get_line(joint), "transmission of a fixed joint", target)
                 elif each in self.motors:
-                    self.defect(xml.line(joint), "second transmission of a joint", target)
+                    self.defect(xml.get_line(joint), "second transmission of a joint", target)
                 elif name is not None and planar:
                     self.motors[each] = Motor(name + each.removeprefix(target))
                 elif name is not None:
-                    text = xml.canonical(element)
-                    simple = [xml.canonical(simple_transmission(name, target, each)) for each in (INTERFACE, None)]
+                    text = xml.format_canonical(element)
+                    simple = [
+                        xml.format_canonical(build_transmission(name, target, each)) for each in (INTERFACE, None)
+                    ]
                     self.motors[each] = Motor(name, None if text in simple else text)
 
     def own(self, elements: list[xml.Element]) -> None:
         """Read the ``<hrsynth>`` element: platform, camera, observations."""
         for extra in elements[1:]:
-            self.defect(xml.line(extra), "second <hrsynth>")
+            self.defect(xml.get_line(extra), "second <hrsynth>")
         if not elements:
-            self.defect(xml.line(self.root), "no <hrsynth> element, so no <platform>")
+            self.defect(xml.get_line(self.root), "no <hrsynth> element, so no <platform>")
             return
         element = elements[0]
         self.serial = element.get("serial") == "true"
@@ -143,52 +147,54 @@ class _NativeReader(UrdfReader):
         for role in ("platform", "camera"):
             found = [each for each in element.findall(role) if role == "platform" or each.get("name") is None]
             for extra in found[1:]:
-                self.defect(xml.line(extra), f"second <{role}> in <hrsynth>" + " without a name" * (role == "camera"))
+                self.defect(
+                    xml.get_line(extra), f"second <{role}> in <hrsynth>" + " without a name" * (role == "camera")
+                )
             if found:
                 child = found[0]
                 link = self.attribute(child, "link")
-                if self.check_link(link, xml.line(child), f"{role}: unknown link"):
+                if self.is_known_link(link, xml.get_line(child), f"{role}: unknown link"):
                     setattr(self, role, link)
                 if role == "platform":
                     if (text := child.get("turns", "true")) not in TURNS:
-                        self.defect(xml.line(child), "turns of <platform>", text, "true, false")
+                        self.defect(xml.get_line(child), "turns of <platform>", text, "true, false")
                     self.turns = TURNS.get(child.get("turns", ""))
             elif role == "platform":
                 self.formation = bool(self.seen)
                 if not self.formation:
                     self.defect(
-                        xml.line(element),
+                        xml.get_line(element),
                         "no <platform>",
                         None,
                         "a <platform>, or <observe> between the bodies of a formation",
                     )
         for observe in element.findall("observe"):
             self.observe(observe)
-        for child in xml.children(element):
+        for child in xml.list_children(element):
             if child.tag not in OWN_TAGS and (
                 child.tag in ELSEWHERE or difflib.get_close_matches(child.tag, OWN_TAGS, n=1, cutoff=0.75)
             ):
                 self.defect(
-                    xml.line(child),
+                    xml.get_line(child),
                     "unknown element in <hrsynth>",
                     f"<{child.tag}>",
                     ", ".join(f"<{tag}>" for tag in OWN_TAGS),
                 )
-        rest = xml.unknown(element, ["serial"], OWN_TAGS)
+        rest = xml.list_unknown(element, ["serial"], OWN_TAGS)
         if rest:
             bare = etree.Element("hrsynth")
             xml.restore(bare, rest)
-            self.rest.append(xml.canonical(bare))
+            self.rest.append(xml.format_canonical(bare))
 
     def observe(self, element: xml.Element) -> None:
         """Read an ``<observe>`` of a direction."""
         if is_sight(element):
             return
         leg, link = self.attribute(element, "leg"), self.attribute(element, "link")
-        self.check_link(link, xml.line(element), "observe: unknown link")
+        self.is_known_link(link, xml.get_line(element), "observe: unknown link")
         if leg is not None and (leg == "all" or "," in leg):
             self.defect(
-                xml.line(element),
+                xml.get_line(element),
                 "observe: label not usable in a list",
                 leg,
                 "a label without commas, other than all",
@@ -197,11 +203,11 @@ class _NativeReader(UrdfReader):
             return
         direction = self.direction(element, "axis", (0, 0, 1))
         if leg is not None and link is not None:
-            self.observations.append(Direction(leg, link, direction, line=xml.line(element)))
+            self.observations.append(Direction(leg, link, direction, line=xml.get_line(element)))
 
     def structure(self) -> str | None:
         """Return the base; tree joints that do not form one tree are defects."""
-        root_line = xml.line(self.root)
+        root_line = xml.get_line(self.root)
         if not self.links:
             self.require_some(self.links, "links", self.root)
             return None
@@ -247,11 +253,11 @@ class _NativeReader(UrdfReader):
     def check_platform(self, base: str) -> None:
         """Check that the platform differs from the base and is connected to it; that of a formation is its first
         body."""
-        line = next((xml.line(each) for each in self.root.iterfind("hrsynth/platform")), None)
+        line = next((xml.get_line(each) for each in self.root.iterfind("hrsynth/platform")), None)
         whole = [joint.links for joint in self.joints.values() if None not in (joint.ends[0].link, joint.ends[1].link)]
         if self.formation:
             told = [*(each.link for each in self.seen), *(each.link for each in self.cameras)]
-            self.platform, count = first_body(self.links, whole, base, told)
+            self.platform, count = find_first_body(self.links, whole, base, told)
             if self.platform is None:
                 self.defect(
                     line,
@@ -264,14 +270,14 @@ class _NativeReader(UrdfReader):
             return
         if self.platform == base:
             self.defect(line, "the platform is the base", base)
-        elif self.platform not in graphs.component(graphs.adjacency(self.links, whole), base):
+        elif self.platform not in graphs.find_component(graphs.build_adjacency(self.links, whole), base):
             self.defect(line, f"platform not connected to the base {base!r}", self.platform)
 
     def assemble(self, name: str, base: str, platform: str) -> Mechanism:
         """Return the mechanism, all geometry in the base frame at the zero configuration; its loops must be closed
         there."""
-        tree: list[TreeJoint] = graphs.outward(base, self.tree.values())
-        poses = zero_poses(base, tree)
+        tree: list[TreeJoint] = graphs.order_outward(base, self.tree.values())
+        poses = compute_zero_poses(base, tree)
         joints, loops = {}, []
         for joint in self.joints.values():
             X_P, X_S = joint.frames(poses)
@@ -313,7 +319,7 @@ class _NativeReader(UrdfReader):
             if joint.type is JointType.UNIVERSAL:
                 cosine = float(X_P[:3, :3] @ joint.axes[0] @ (X_S[:3, :3] @ joint.axes[1]))
                 gap = np.linalg.norm(X_S[:3, 3] - X_P[:3, 3])
-                if gap <= SAME_GEOMETRY * mechanism.length and not abs(cosine) <= SAME_DIRECTION:
+                if gap <= GEOMETRY_DIFFERENCE_TOL * mechanism.length and not abs(cosine) <= DIRECTION_SINE_TOL:
                     self.defect(
                         joint.line,
                         f"universal loop {joint.name!r}: cosine between axis and axis2",
@@ -326,7 +332,7 @@ class _NativeReader(UrdfReader):
 
     def with_sensors(self, mechanism: Mechanism) -> Mechanism:
         """Return the mechanism with its cameras and observations of all kinds."""
-        return as_written(mechanism, self.seen, self.cameras, self.file)
+        return add_file_observations(mechanism, self.seen, self.cameras, self.file)
 
     def repair_rounding(
         self, mechanism: Mechanism, loops: Sequence[tuple[JointSpec, Array, Array]], poses: Mapping[str, Array]
@@ -337,9 +343,9 @@ class _NativeReader(UrdfReader):
         from ...assembly.build import joint_at, rounding
         from ...assembly.geometry_repair import snap_geometry
 
-        opening = max(residual(joint, X_P, X_S, mechanism.length) for joint, X_P, X_S in loops)
+        opening = max(compute_closure_residual(joint, X_P, X_S, mechanism.length) for joint, X_P, X_S in loops)
         tolerance = self.tolerance or rounding(self.digits, mechanism.length, opening)
-        if not (tolerance and opening <= NO_FINER * tolerance):
+        if not (tolerance and opening <= TOLERANCE_AMBIGUITY_FRACTION * tolerance):
             return None
         self.require_sound()
         between = [replace(joint_at(joint, poses, False), motor=self.motors.get(joint.name)) for joint, _, _ in loops]

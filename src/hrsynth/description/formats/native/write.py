@@ -8,19 +8,19 @@ from collections.abc import Sequence
 import numpy as np
 from lxml import etree
 
-from ....budgets import LARGEST_NUMBER
+from ....budgets import FILE_NUMBER_MAX
 from ....errors import BadRequest
-from ....geometry.vectors import Array, inverse, pose, unit
+from ....geometry.vectors import Array, build_pose, invert_pose, normalise_vector
 from ....mechanism.model import Joint, JointType, Limits, Mechanism, Motor
-from ....mechanism.screws import elementary
-from ....tolerances import AT_ORIGIN, SAME_DIRECTION
+from ....mechanism.screws import split_elementary
+from ....tolerances import DIRECTION_SINE_TOL, ORIGIN_DISTANCE_TOL
 from ... import chains, numerals, xml
-from ...annotations import IMAGE, camera_attributes
+from ...annotations import IMAGE, list_camera_attributes
 from ...file_format import Written
 from ...jointgraph import LOOP_TYPES, ORIGIN
-from ...observation_text import attributes_of
-from ...tree import outward, spanning
-from ..urdf.elements import simple_transmission
+from ...observation_text import list_observe_attributes
+from ...tree import build_spanning_mechanism, list_outward_joints
+from ..urdf.elements import build_transmission
 
 _LOOP_NAMES = {kind: name for name, kind in LOOP_TYPES.items() if name != "continuous"}
 _OWN = re.compile(r"<hrsynth[\s/>]")
@@ -29,10 +29,10 @@ NO_LIMIT = {"lower": -1000.0, "upper": 1000.0, "effort": 1000.0, "velocity": 100
 
 def write(mechanism: Mechanism) -> Written:
     """Return the robot file of a mechanism, in which nothing is lost."""
-    return Written((text(mechanism),))
+    return Written((write_text(mechanism),))
 
 
-def text(mechanism: Mechanism) -> str:
+def write_text(mechanism: Mechanism) -> str:
     """Return the text of that file: reading it gives ``spanning(mechanism)`` again, writing that the same text.
 
         Raises
@@ -41,12 +41,12 @@ def text(mechanism: Mechanism) -> str:
     For what the format cannot express: an observation by a link without a named camera, a universal joint whose
             axes are not perpendicular, a link that has the name of a link in between, numbers that are not finite.
     """
-    return _NativeWriter(spanning(mechanism)).text()
+    return _NativeWriter(build_spanning_mechanism(mechanism)).text()
 
 
-def joint_names(joint: Joint) -> list[str]:
+def list_joint_names(joint: Joint) -> list[str]:
     """Return the names of the file's joints for a tree joint: one for each coordinate, but one for a free joint."""
-    return chains.part_names(joint.name, 1 if joint.type is JointType.FREE else joint.type.freedoms)
+    return chains.list_chain_joints(joint.name, 1 if joint.type is JointType.FREE else joint.type.freedoms)
 
 
 class _NativeWriter:
@@ -57,39 +57,42 @@ class _NativeWriter:
         coordinates = [link.pose[:3, 3] for link in mechanism.links.values()]
         coordinates += [joint.point for joint in mechanism.joints.values()]
         scale = float(np.max(np.abs(coordinates)))
-        if not scale <= LARGEST_NUMBER:
-            raise BadRequest("coordinates of links and joints", scale, f"finite numbers up to {LARGEST_NUMBER:g}")
-        self.decimals = numerals.length_decimals(scale)
+        if not scale <= FILE_NUMBER_MAX:
+            raise BadRequest("coordinates of links and joints", scale, f"finite numbers up to {FILE_NUMBER_MAX:g}")
+        self.decimals = numerals.count_length_decimals(scale)
         self.poses: dict[str, Array] = {mechanism.base: ORIGIN}
 
     def text(self) -> str:
         robot = self.mechanism
         try:
-            written = {joint.name: self._tree_joint(joint) for joint in outward(robot)}
+            written = {joint.name: self._tree_joint(joint) for joint in list_outward_joints(robot)}
             written |= {joint.name: [self._loop(joint)] for joint in robot.joints.values() if not joint.in_tree}
             order = sorted(robot.joints.values(), key=lambda joint: not joint.in_tree)
-            root = xml.new("robot", name=robot.name)
+            root = xml.create_element("robot", name=robot.name)
             for link in robot.links.values():
                 element = etree.SubElement(root, "link", name=link.name)
                 xml.restore(element, link.xml)
             for joint in order:
                 root.extend(written[joint.name])
             for each in robot.couplings:
-                ends = xml.new("predecessor", link=each.predecessor), xml.new("successor", link=each.successor)
-                ratio = xml.new("ratio", value=numerals.exact(each.ratio))
-                root.append(xml.new("coupling", *ends, ratio, name=each.name))
+                ends = (
+                    xml.create_element("predecessor", link=each.predecessor),
+                    xml.create_element("successor", link=each.successor),
+                )
+                ratio = xml.create_element("ratio", value=numerals.format_exact(each.ratio))
+                root.append(xml.create_element("coupling", *ends, ratio, name=each.name))
             self._transmissions(root, order)
             inner = [fragment for fragment in robot.xml if _OWN.match(fragment)]
             xml.restore(root, [fragment for fragment in robot.xml if fragment not in inner])
-            if len(own := self._own(inner)) or not self.mechanism.open_platform:
+            if len(own := self._own(inner)) or not self.mechanism.has_open_platform:
                 root.append(own)
         except ValueError as error:  # lxml: characters that no XML document can hold
             raise BadRequest("a name cannot be written", robot.name, str(error)) from None
-        return xml.text_of(root)
+        return xml.format_document(root)
 
     def _origin(self, parent: xml.Element, X: Array) -> Array:
         """Append an ``<origin>`` unless it is the identity; return the pose that reading it gives."""
-        read, attributes = numerals.origin(X, self.decimals)
+        read, attributes = numerals.format_origin(X, self.decimals)
         if attributes:
             etree.SubElement(parent, "origin", attributes)
         return read
@@ -97,13 +100,15 @@ class _NativeWriter:
     def _tree_joint(self, joint: Joint) -> list[xml.Element]:
         """Return the chain of links and joints that a tree joint is written as."""
         X_P, X_child = self.poses[joint.predecessor], self.mechanism.links[joint.successor].pose
-        tip = bool(np.linalg.norm(X_child[:3, 3] - joint.point) > AT_ORIGIN)
-        X_PJ, attributes = numerals.origin(inverse(X_P) @ pose(joint.point, X_child[:3, :3]), self.decimals)
+        tip = bool(np.linalg.norm(X_child[:3, 3] - joint.point) > ORIGIN_DISTANCE_TOL)
+        X_PJ, attributes = numerals.format_origin(
+            invert_pose(X_P) @ build_pose(joint.point, X_child[:3, :3]), self.decimals
+        )
         X_J = X_P @ X_PJ if attributes else X_P
         parts: list[tuple[JointType, Array | None]] = [(joint.type, None)]
         if joint.type not in (JointType.FREE, JointType.FIXED):
-            parts = [*elementary(joint.type, _local_axes(joint, X_J))]
-        names = joint_names(joint)
+            parts = [*split_elementary(joint.type, _compute_local_axes(joint, X_J))]
+        names = list_joint_names(joint)
         links = [joint.predecessor, *names[:-1], joint.name + chains.TIP if tip else joint.successor]
         elements = []
         for name in names[1:]:
@@ -111,48 +116,53 @@ class _NativeWriter:
         for number, (name, (kind, axis)) in enumerate(zip(names, parts, strict=True)):
             if links[number + 1] != joint.successor:
                 elements.append(self._between(links[number + 1], joint))
-            element = _tree_element(name, _tree_type(kind, joint.limits), links[number], links[number + 1])
+            element = _build_tree_element(name, _choose_tree_type(kind, joint.limits), links[number], links[number + 1])
             if attributes and number == 0:
                 etree.SubElement(element, "origin", attributes)
             if axis is not None:
-                etree.SubElement(element, "axis", xyz=numerals.axis(axis))
+                etree.SubElement(element, "axis", xyz=numerals.format_axis(axis))
             _limit(element, kind, joint.limits)
             if number == 0:
                 xml.restore(element, joint.xml)
             elements.append(element)
         if tip:
-            element = _tree_element(links[-1], "fixed", links[-1], joint.successor)
-            X_J = X_J @ self._origin(element, pose(X_J[:3, :3].T @ (X_child[:3, 3] - X_J[:3, 3])))
+            element = _build_tree_element(links[-1], "fixed", links[-1], joint.successor)
+            X_J = X_J @ self._origin(element, build_pose(X_J[:3, :3].T @ (X_child[:3, 3] - X_J[:3, 3])))
             elements.append(element)
         self.poses[joint.successor] = X_J
         return elements
 
     def _between(self, name: str, joint: Joint) -> xml.Element:
         chains.require_free(name, joint, self.mechanism.links, self.mechanism.joints)
-        return xml.new("link", name=name)
+        return xml.create_element("link", name=name)
 
     def _loop(self, joint: Joint) -> xml.Element:
         X_P, X_S = self.poses[joint.predecessor], self.poses[joint.successor]
-        one, two = xml.new("predecessor", link=joint.predecessor), xml.new("successor", link=joint.successor)
-        X_J = X_P @ self._origin(one, pose(X_P[:3, :3].T @ (joint.point - X_P[:3, 3])))
-        X_K = X_S @ self._origin(two, inverse(X_S) @ X_J)
-        element = xml.new("loop", one, two, name=joint.name, type=_LOOP_NAMES[joint.type])
-        axes = [*_local_axes(joint, X_J)[:1], *_local_axes(joint, X_K)[1:]]
+        one, two = (
+            xml.create_element("predecessor", link=joint.predecessor),
+            xml.create_element("successor", link=joint.successor),
+        )
+        X_J = X_P @ self._origin(one, build_pose(X_P[:3, :3].T @ (joint.point - X_P[:3, 3])))
+        X_K = X_S @ self._origin(two, invert_pose(X_S) @ X_J)
+        element = xml.create_element("loop", one, two, name=joint.name, type=_LOOP_NAMES[joint.type])
+        axes = [*_compute_local_axes(joint, X_J)[:1], *_compute_local_axes(joint, X_K)[1:]]
         for tag, axis in zip(("axis", "axis2"), axes, strict=False):
-            etree.SubElement(element, tag, xyz=numerals.axis(axis))
+            etree.SubElement(element, tag, xyz=numerals.format_axis(axis))
         if joint.limits is not None:
-            etree.SubElement(element, "limit", {k: numerals.exact(v) for k, v in _known_limits(joint.limits).items()})
+            etree.SubElement(
+                element, "limit", {k: numerals.format_exact(v) for k, v in _list_known_limits(joint.limits).items()}
+            )
         xml.restore(element, joint.xml)
         return element
 
     def _transmissions(self, root: xml.Element, order: Sequence[Joint]) -> None:
-        names = {joint.name: joint_names(joint) if joint.in_tree else [joint.name] for joint in order}
+        names = {joint.name: list_joint_names(joint) if joint.in_tree else [joint.name] for joint in order}
         every = {name for own in names.values() for name in own}
         shared: set[str] = set()
         for joint in order:
-            for element in _motors(joint.motor, names[joint.name], every):
+            for element in _build_transmissions(joint.motor, names[joint.name], every):
                 if len(element.findall("joint")) > 1:
-                    text = xml.canonical(element)
+                    text = xml.format_canonical(element)
                     if text in shared:
                         continue
                     shared.add(text)
@@ -163,18 +173,20 @@ class _NativeWriter:
         element = etree.Element("hrsynth")
         if all(joint.in_tree for joint in robot.joints.values()):
             element.set("serial", "true")
-        if not robot.formation and not robot.open_platform:
+        if not robot.formation and not robot.has_open_platform:
             said = {} if robot.turns is None else {"turns": str(robot.turns).lower()}
             etree.SubElement(element, "platform", said, link=robot.platform)
         if robot.camera is not None:
             etree.SubElement(element, "camera", link=robot.camera)
         for camera in robot.cameras:
-            said = camera_attributes(camera, self.decimals)
+            said = list_camera_attributes(camera, self.decimals)
             eye = etree.SubElement(element, "camera", name=camera.name, link=camera.link)
             for tag, keys in (("origin", ("xyz", "rpy")), ("image", IMAGE)):
                 if inside := {key: said[key] for key in keys if key in said}:
                     etree.SubElement(eye, tag, inside)
-        for seen in dict.fromkeys(tuple(attributes_of(o, robot, self.decimals).items()) for o in robot.observations):
+        for seen in dict.fromkeys(
+            tuple(list_observe_attributes(o, robot, self.decimals).items()) for o in robot.observations
+        ):
             etree.SubElement(element, "observe", dict(seen))
         for fragment in inner:
             whole = xml.parse_fragment(fragment)
@@ -184,21 +196,21 @@ class _NativeWriter:
         return element
 
 
-def _local_axes(joint: Joint, X_J: Array) -> list[Array]:
+def _compute_local_axes(joint: Joint, X_J: Array) -> list[Array]:
     """Return the joint's axes in its frame, exactly as they will be read."""
     if joint.type is JointType.UNIVERSAL:
         cosine = float(joint.axes[0] @ joint.axes[1])
-        if not abs(cosine) <= SAME_DIRECTION:
+        if not abs(cosine) <= DIRECTION_SINE_TOL:
             raise BadRequest(f"cosine between the axes of the universal joint {joint.name!r}", cosine, "0")
-    return [unit(numerals.parse(numerals.axis(X_J[:3, :3].T @ axis), 3)) for axis in joint.axes]
+    return [normalise_vector(numerals.parse(numerals.format_axis(X_J[:3, :3].T @ axis), 3)) for axis in joint.axes]
 
 
-def _tree_element(name: str, kind: str, parent: str, child: str) -> xml.Element:
-    ends = xml.new("parent", link=parent), xml.new("child", link=child)
-    return xml.new("joint", *ends, name=name, type=kind)
+def _build_tree_element(name: str, kind: str, parent: str, child: str) -> xml.Element:
+    ends = xml.create_element("parent", link=parent), xml.create_element("child", link=child)
+    return xml.create_element("joint", *ends, name=name, type=kind)
 
 
-def _tree_type(kind: JointType, limits: Limits | None) -> str:
+def _choose_tree_type(kind: JointType, limits: Limits | None) -> str:
     if kind is JointType.REVOLUTE:
         bounded = limits is not None and (limits.lower is not None or limits.upper is not None)
         return "revolute" if bounded else "continuous"
@@ -208,7 +220,7 @@ def _tree_type(kind: JointType, limits: Limits | None) -> str:
 def _limit(element: xml.Element, kind: JointType, limits: Limits | None) -> None:
     """Append a ``<limit>`` with all attributes that URDF requires; ``free`` names the values that stand for no
     limit."""
-    known = {} if limits is None else _known_limits(limits)
+    known = {} if limits is None else _list_known_limits(limits)
     if kind is JointType.PRISMATIC or (kind is JointType.REVOLUTE and {"lower", "upper"} & set(known)):
         needed = list(NO_LIMIT)
     elif known:
@@ -217,21 +229,21 @@ def _limit(element: xml.Element, kind: JointType, limits: Limits | None) -> None
         return
     free = [key for key in needed if key not in known]
     values = known | {key: NO_LIMIT[key] for key in free}
-    attributes = {key: numerals.exact(values[key]) for key in NO_LIMIT if key in values}
+    attributes = {key: numerals.format_exact(values[key]) for key in NO_LIMIT if key in values}
     if free:
         attributes["free"] = " ".join(free)
     etree.SubElement(element, "limit", attributes)
 
 
-def _known_limits(limits: Limits) -> dict[str, float]:
+def _list_known_limits(limits: Limits) -> dict[str, float]:
     return {key: value for key in NO_LIMIT if (value := getattr(limits, key)) is not None}
 
 
-def _motors(motor: Motor | None, names: Sequence[str], all_names: set[str]) -> list[xml.Element]:
+def _build_transmissions(motor: Motor | None, names: Sequence[str], all_names: set[str]) -> list[xml.Element]:
     """Yield the transmissions of one motor: those of the file it came from if they still fit, else simple ones."""
     if motor is None:
         return []
-    titles = chains.part_names(motor.name, len(names))
+    titles = chains.list_chain_joints(motor.name, len(names))
     if motor.xml is not None:
         found = list(xml.parse_fragment(f"<motors>{motor.xml}</motors>"))
         if len(found) == len(names) and all(len(element.findall("joint")) == 1 for element in found):
@@ -242,4 +254,4 @@ def _motors(motor: Motor | None, names: Sequence[str], all_names: set[str]) -> l
         named = {joint.get("name") for element in found for joint in element.findall("joint")}
         if set(names) <= named <= all_names:
             return found
-    return [simple_transmission(title, name) for title, name in zip(titles, names, strict=True)]
+    return [build_transmission(title, name) for title, name in zip(titles, names, strict=True)]

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ....geometry.vectors import Array, pose, rotation_from_rpy
-from ....mechanism.model import JointType, Link, Motor, fresh_name
-from ....tolerances import NOISE, WITHOUT_DIRECTION
+from ....geometry.vectors import Array, build_pose, convert_rpy_to_rotation
+from ....mechanism.model import JointType, Link, Motor, make_fresh_name
+from ....tolerances import INCIDENCE_TOL, VECTOR_LENGTH_MIN
 from ... import xml
-from ...chains import part
-from ...elements import XmlReader, sound_limits
+from ...chains import name_chain_joint
+from ...elements import XmlReader, read_sound_limits
 from ...jointgraph import ORIGIN, CouplingSpec, FrameSpec, JointGraph, JointSpec
 
 TYPES = {
@@ -31,29 +31,29 @@ TYPES = {
 _AXES = {"R": ("axis",), "P": ("axis",), "H": ("axis",), "C": ("axis",), "U": ("axis", "axis2")}
 
 
-def text(element: xml.Element | None, tag: str) -> str | None:
+def read_text(element: xml.Element | None, tag: str) -> str | None:
     """Return the text of a child element, None if it is empty or absent."""
     return None if element is None else (element.findtext(tag) or "").strip() or None
 
 
-def numbers(reader: XmlReader, element: xml.Element | None, default: tuple[float, ...]) -> Array:
+def read_numbers(reader: XmlReader, element: xml.Element | None, default: tuple[float, ...]) -> Array:
     """Return the numbers of an element, as many as the default has; the default if it holds none."""
     if element is None:
         return np.array(default, dtype=float)
-    return reader.values((element.text or "").strip() or None, default, xml.line(element), f"<{element.tag}>")
+    return reader.values((element.text or "").strip() or None, default, xml.get_line(element), f"<{element.tag}>")
 
 
-def pose_of(reader: XmlReader, element: xml.Element | None) -> Array:
+def read_pose(reader: XmlReader, element: xml.Element | None) -> Array:
     """Return the pose (4, 4) of a ``<pose>``: x y z roll pitch yaw, with its options for degrees or a quaternion."""
     if element is None:
         return ORIGIN
     if element.get("rotation_format") == "quat_xyzw":
-        values = numbers(reader, element, (0, 0, 0, 0, 0, 0, 1))
-        return pose(values[:3], reader.rotation(element, np.roll(values[3:], 1)))
-    values = numbers(reader, element, (0,) * 6)
+        values = read_numbers(reader, element, (0, 0, 0, 0, 0, 0, 1))
+        return build_pose(values[:3], reader.rotation(element, np.roll(values[3:], 1)))
+    values = read_numbers(reader, element, (0,) * 6)
     angles = np.radians(values[3:]) if element.get("degrees") in ("true", "1") else values[3:]
     reader.digits.angles(angles)
-    return pose(values[:3], rotation_from_rpy(*angles)) if np.any(angles) else pose(values[:3])
+    return build_pose(values[:3], convert_rpy_to_rotation(*angles)) if np.any(angles) else build_pose(values[:3])
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,7 @@ def add(
     prefix: str = "",
 ) -> None:
     """Add the joint of a ``<joint>`` to the graph: one joint, a chain of joints, or a coupling."""
-    line, bare, kind = xml.line(element), reader.attribute(element, "name"), TYPES.get(element.get("type", ""))
+    line, bare, kind = xml.get_line(element), reader.attribute(element, "name"), TYPES.get(element.get("type", ""))
     if kind is None:
         reader.defect(line, "unknown joint type", element.get("type"), ", ".join(TYPES))
     if bare is None or kind is None:
@@ -89,13 +89,13 @@ def add(
     if name in graph.joints:
         reader.defect(line, "second joint of the same name", name)
         return
-    axes = tuple(_axis(reader, graph, element, tag, frames, version, name) for tag in _AXES.get(kind, ()))
+    axes = tuple(_read_axis(reader, graph, element, tag, frames, version, name) for tag in _AXES.get(kind, ()))
     one, two = FrameSpec(links[0], frames.X_parent, line), FrameSpec(links[1], frames.X_child, line)
     if kind == "G":
         _add_gear(reader, graph, element, links, name)
-    elif kind == "H" or (kind == "U" and abs(float(axes[0] @ axes[1])) > NOISE):
+    elif kind == "H" or (kind == "U" and abs(float(axes[0] @ axes[1])) > INCIDENCE_TOL):
         taken = {prefix + str(each.get("name")) for each in reader.root.iter("joint", "link")} | set(graph.joints)
-        first, second = (fresh_name(part(name, k), taken, graph.links) for k in (1, 2))
+        first, second = (make_fresh_name(name_chain_joint(name, k), taken, graph.links) for k in (1, 2))
         link = first
         between = FrameSpec(link, ORIGIN, line)
         graph.links[link] = Link(link, line=line)
@@ -106,18 +106,18 @@ def add(
             graph.gears.append(CouplingSpec(f"{name}__thread", first, second, _lead(reader, element, name), line=line))
     else:
         limit = element.find("axis/limit")
-        limits = sound_limits(lambda key: text(limit, key))
+        limits = read_sound_limits(lambda key: read_text(limit, key))
         graph.joints[name] = JointSpec(name, JointType(kind), (one, two), axes, limits, (), line, None, in_tree)
 
 
-def mimics(reader: XmlReader, joints: Iterable[tuple[str, xml.Element]]) -> list[CouplingSpec]:
+def read_couplings(reader: XmlReader, joints: Iterable[tuple[str, xml.Element]]) -> list[CouplingSpec]:
     """Yield the couplings of ``<mimic>``: q = multiplier × (q of the other joint − reference) + offset."""
     found = []
     for prefix, element in joints:
         for mimic in element.findall("axis/mimic"):
             name, driver = element.get("name"), reader.attribute(mimic, "joint")
             ratio, offset, start = (
-                float(numbers(reader, mimic.find(tag), (default,))[0])
+                float(read_numbers(reader, mimic.find(tag), (default,))[0])
                 for tag, default in (("multiplier", 1.0), ("offset", 0.0), ("reference", 0.0))
             )
             if name is not None and driver is not None:
@@ -128,13 +128,13 @@ def mimics(reader: XmlReader, joints: Iterable[tuple[str, xml.Element]]) -> list
                         prefix + name,
                         ratio,
                         offset - ratio * start,
-                        xml.line(mimic),
+                        xml.get_line(mimic),
                     )
                 )
     return found
 
 
-def _axis(
+def _read_axis(
     reader: XmlReader,
     graph: JointGraph,
     joint: xml.Element,
@@ -148,15 +148,17 @@ def _axis(
     element, xyz = joint.find(tag), joint.find(f"{tag}/xyz")
     if element is None:
         graph.assumed.setdefault(f"<{tag}> 0 0 1, the format's default, for joints without one", []).append(name)
-    vector = reader.unit(numbers(reader, xyz, (0, 0, 1)), xml.line(joint), f"<{tag}> of joint {name!r}", "0 0 0")
+    vector = reader.unit(
+        read_numbers(reader, xyz, (0, 0, 1)), xml.get_line(joint), f"<{tag}> of joint {name!r}", "0 0 0"
+    )
     frame = None if xyz is None else xyz.get("expressed_in")
-    of_model = text(element, "use_parent_model_frame") in ("1", "true")
+    of_model = read_text(element, "use_parent_model_frame") in ("1", "true")
     if frame == "__model__" or of_model or (version <= (1, 4) and frame is None):
         return np.asarray(frames.X_model[:3, :3].T @ frames.R_model @ vector)
     if frame:
         X = frames.named(frame)
         if X is None:
-            reader.defect(xml.line(joint), f"axis of joint {name!r}: expressed in an unknown frame", frame)
+            reader.defect(xml.get_line(joint), f"axis of joint {name!r}: expressed in an unknown frame", frame)
             return vector
         return np.asarray(frames.X_model[:3, :3].T @ X[:3, :3] @ vector)
     return vector
@@ -167,19 +169,21 @@ def _lead(reader: XmlReader, element: xml.Element, name: str) -> float:
     (left-handed)."""
     pitch = element.find("screw_thread_pitch")
     if pitch is not None:
-        return float(numbers(reader, pitch, (1.0,))[0]) / (2 * np.pi)
-    old = float(numbers(reader, element.find("thread_pitch"), (1.0,))[0])
-    if not abs(old) > WITHOUT_DIRECTION:
-        reader.defect(xml.line(element), f"thread_pitch of joint {name!r}", "0", "another number")
+        return float(read_numbers(reader, pitch, (1.0,))[0]) / (2 * np.pi)
+    old = float(read_numbers(reader, element.find("thread_pitch"), (1.0,))[0])
+    if not abs(old) > VECTOR_LENGTH_MIN:
+        reader.defect(xml.get_line(element), f"thread_pitch of joint {name!r}", "0", "another number")
         return 1.0
     return -1.0 / old
 
 
 def _add_gear(reader: XmlReader, graph: JointGraph, element: xml.Element, links: tuple[str, str], name: str) -> None:
     """Add the coupling of a gearbox, between the two revolute joints on its reference body: θ₂ = −ratio θ₁."""
-    body = text(element, "gearbox_reference_body")
-    ratio = -float(numbers(reader, element.find("gearbox_ratio"), (1.0,))[0])
-    graph.gears.append(CouplingSpec(name, f"{body}\n{links[0]}", f"{body}\n{links[1]}", ratio, line=xml.line(element)))
+    body = read_text(element, "gearbox_reference_body")
+    ratio = -float(read_numbers(reader, element.find("gearbox_ratio"), (1.0,))[0])
+    graph.gears.append(
+        CouplingSpec(name, f"{body}\n{links[0]}", f"{body}\n{links[1]}", ratio, line=xml.get_line(element))
+    )
 
 
 def name_gears(reader: XmlReader, graph: JointGraph) -> None:
@@ -207,7 +211,7 @@ def name_gears(reader: XmlReader, graph: JointGraph) -> None:
     graph.gears = found
 
 
-def guess_motors(graph: JointGraph) -> None:
+def infer_motors(graph: JointGraph) -> None:
     """Assume that the joints with a nonzero effort limit are the motors, if only some limits are zero."""
     efforts = {
         name: joint.limits.effort

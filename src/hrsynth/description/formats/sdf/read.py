@@ -6,21 +6,21 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ....budgets import MOST_NESTED_MODELS
+from ....budgets import NESTED_MODELS_MAX
 from ....errors import BadRobotFile
-from ....geometry.vectors import Array, frozen, inverse
+from ....geometry.vectors import Array, freeze_array, invert_pose
 from ....mechanism.model import Link
-from ....tolerances import SAME_GEOMETRY
+from ....tolerances import GEOMETRY_DIFFERENCE_TOL
 from ... import xml
 from ...annotations import NAMESPACE, drop_world, read_annotation
 from ...elements import XmlReader
 from ...file_format import RobotFile
-from ...jointgraph import ORIGIN, FrameSpec, JointGraph, comma_list
-from ...keyframes import value_of
+from ...jointgraph import ORIGIN, FrameSpec, JointGraph, join_names
+from ...keyframes import read_joint_value
 from ..extensions import read_drake, read_plugins
-from ..paired import onshape_pairs, other_pairs
+from ..paired import join_named_pairs, join_onshape_pairs
 from .content import read_content
-from .joint import JointFrames, add, guess_motors, mimics, name_gears, numbers, pose_of, text
+from .joint import JointFrames, add, infer_motors, name_gears, read_couplings, read_numbers, read_pose, read_text
 from .names import NAMES
 
 MODEL, WORLD = "__model__", "world"
@@ -69,8 +69,8 @@ class _SdfReader(XmlReader):
             self._joint(prefix, element)
         graph.note_assumed()
         name_gears(self, graph)
-        graph.follow(mimics(self, self.joints))
-        guess_motors(graph)
+        graph.follow(read_couplings(self, self.joints))
+        infer_motors(graph)
         self._states(model.get("name"))
         self._closures(model)
         self.require_sound()
@@ -78,10 +78,10 @@ class _SdfReader(XmlReader):
             graph.links = {WORLD: Link(WORLD), **graph.links}
             graph.base = WORLD
         space = f"{{{NAMESPACE}}}"
-        for element in [each for each in xml.children(model) if each.tag.startswith(space)]:
+        for element in [each for each in xml.list_children(model) if each.tag.startswith(space)]:
             wrong = read_annotation(graph, element.tag.removeprefix(space), element.text or "")
             if wrong is not None:
-                self.defect(xml.line(element), wrong, element.text)
+                self.defect(xml.get_line(element), wrong, element.text)
         self.require_sound()
         return drop_world(graph)
 
@@ -94,8 +94,8 @@ class _SdfReader(XmlReader):
             found = {}
             for joint in joints:
                 known = self.result.joints.get(joint.get("name", ""))
-                angles = [float(numbers(self, angle, (0,))[0]) for angle in joint.findall("angle")]
-                value = None if known is None else value_of(known.kind, angles)
+                angles = [float(read_numbers(self, angle, (0,))[0]) for angle in joint.findall("angle")]
+                value = None if known is None else read_joint_value(known.kind, angles)
                 if known is not None and value is not None:
                     found[known.name] = value
             if found:
@@ -112,17 +112,17 @@ class _SdfReader(XmlReader):
         if all(joint.in_tree for joint in self.result.joints.values()):
             found = {name: self._frame_spec(name) for name, frame in self.frames.items() if frame.kind == "frame"}
             frames = {name: frame for name, frame in found.items() if frame is not None}
-            onshape_pairs(self, self.result, frames)
-            other_pairs(self.result, frames)
+            join_onshape_pairs(self, self.result, frames)
+            join_named_pairs(self.result, frames)
 
     def _frame_spec(self, name: str) -> FrameSpec | None:
         """Return the link that a link or frame of that name is fixed to, and its pose; None for an unknown name."""
         frame = self.frames.get(name)
-        line = None if frame is None or frame.element is None else xml.line(frame.element)
+        line = None if frame is None or frame.element is None else xml.get_line(frame.element)
         link = None if frame is None else self._link(name, line)
         if link is None:
             return None
-        return FrameSpec(link, frozen(inverse(self._pose(link, line)) @ self._pose(name, line)), line)
+        return FrameSpec(link, freeze_array(invert_pose(self._pose(link, line)) @ self._pose(name, line)), line)
 
     def _version(self) -> tuple[int, int]:
         text = self.root.get("version", "1.6")
@@ -133,7 +133,7 @@ class _SdfReader(XmlReader):
             or len(text) > 8
             or not ((1, 4) <= (int(parts[0]), int(parts[1])) <= (1, 12))
         ):
-            self.defect(xml.line(self.root), "version of <sdf>", text, VERSIONS)
+            self.defect(xml.get_line(self.root), "version of <sdf>", text, VERSIONS)
             raise BadRobotFile(self.defects)
         return int(parts[0]), int(parts[1])
 
@@ -141,18 +141,20 @@ class _SdfReader(XmlReader):
         models = [*self.root.findall("model"), *self.root.findall("world/model")]
         jointed = [model for model in models if model.find(".//joint") is not None] or models
         if len(jointed) != 1:
-            self.defect(xml.line(self.root), "number of models with joints", str(len(jointed)), "1")
+            self.defect(xml.get_line(self.root), "number of models with joints", str(len(jointed)), "1")
             raise BadRobotFile(self.defects)
         return jointed[0]
 
     def _collect(self, model: xml.Element, prefix: str, depth: int) -> None:
         """Collect the frames of a model and of those in it; ``prefix`` begins the names in it."""
-        if depth > MOST_NESTED_MODELS:
-            self.defect(xml.line(model), "models nested too deeply", None, f"{MOST_NESTED_MODELS} levels")
+        if depth > NESTED_MODELS_MAX:
+            self.defect(xml.get_line(model), "models nested too deeply", None, f"{NESTED_MODELS_MAX} levels")
             return
-        for element in xml.children(model):
+        for element in xml.list_children(model):
             if element.tag == "include":
-                self.defect(xml.line(element), "an <include>: other files are not fetched", text(element, "uri"))
+                self.defect(
+                    xml.get_line(element), "an <include>: other files are not fetched", read_text(element, "uri")
+                )
             if element.tag not in ("link", "frame", "joint", "model"):
                 continue
             bare = self.attribute(element, "name")
@@ -161,7 +163,7 @@ class _SdfReader(XmlReader):
             name = prefix + bare
             fixed_to = None
             if element.tag == "joint":
-                fixed_to = prefix + (text(element, "child") or "")
+                fixed_to = prefix + (read_text(element, "child") or "")
                 self.joints.append((prefix, element))
             elif element.tag == "frame":
                 host = element.get("attached_to")
@@ -173,10 +175,10 @@ class _SdfReader(XmlReader):
                 str(element.tag),
             )
             if name in self.frames and not (element.tag == "joint" and self.frames[name].kind != "joint"):
-                self.defect(xml.line(element), f"second <{element.tag}> of the same name", name)
+                self.defect(xml.get_line(element), f"second <{element.tag}> of the same name", name)
                 continue
             if element.tag == "link":
-                self.result.links[name] = Link(name, xml=read_content(self, element), line=xml.line(element))
+                self.result.links[name] = Link(name, xml=read_content(self, element), line=xml.get_line(element))
             if element.tag == "model":
                 self.frames[name + "::" + MODEL] = frame
                 self._collect(element, name + "::", depth + 1)
@@ -194,14 +196,14 @@ class _SdfReader(XmlReader):
         while name != WORLD and name not in self.poses:
             if name in chain or name not in self.frames:
                 cycle = ("frames relative to each other in a cycle", name, "a frame placed relative to the model")
-                unknown = ("unknown frame", name, comma_list(self.frames, like=name))
+                unknown = ("unknown frame", name, join_names(self.frames, like=name))
                 self.defect(line, *(cycle if name in chain else unknown))
                 return ORIGIN
             chain.append(name)
             name = self.frames[name].relative_to
         X = ORIGIN if name == WORLD else self.poses[name]
         for each in reversed(chain):
-            X = X @ pose_of(self, self.frames[each].element)
+            X = X @ read_pose(self, self.frames[each].element)
             self.poses[each] = X
         return X
 
@@ -211,7 +213,7 @@ class _SdfReader(XmlReader):
         while name != WORLD and name not in links:
             frame = self.frames.get(name)
             if frame is None or name in passed:
-                self.defect(line, "unknown link or frame", name, comma_list(self.frames, like=name))
+                self.defect(line, "unknown link or frame", name, join_names(self.frames, like=name))
                 return None
             passed.add(name)
             if frame.kind == "model":
@@ -222,9 +224,9 @@ class _SdfReader(XmlReader):
         return name
 
     def _joint(self, prefix: str, element: xml.Element) -> None:
-        line, names = xml.line(element), []
+        line, names = xml.get_line(element), []
         for tag in ("parent", "child"):
-            name = text(element, tag)
+            name = read_text(element, tag)
             if name is None:
                 self.defect(line, f"joint without <{tag}>", element.get("name"))
                 return
@@ -236,8 +238,8 @@ class _SdfReader(XmlReader):
         if parent == child:
             self.defect(line, f"joint {title!r} connects a link to itself", parent)
             return
-        X_J = self._pose(self._host(prefix, element) or names[1], line) @ pose_of(self, element.find("pose"))
-        X_PW, X_CW = inverse(self._pose(parent, line)), inverse(self._pose(child, line))
+        X_J = self._pose(self._host(prefix, element) or names[1], line) @ read_pose(self, element.find("pose"))
+        X_PW, X_CW = invert_pose(self._pose(parent, line)), invert_pose(self._pose(child, line))
         frames = JointFrames(
             X_PW @ X_J,
             X_CW @ X_J,
@@ -248,7 +250,7 @@ class _SdfReader(XmlReader):
         explicit = self.frames.get(names[0])
         if explicit is not None and explicit.kind == "frame":
             X_F = self._pose(names[0], line)
-            if np.linalg.norm(X_F[:3, 3] - X_J[:3, 3]) > SAME_GEOMETRY:
+            if np.linalg.norm(X_F[:3, 3] - X_J[:3, 3]) > GEOMETRY_DIFFERENCE_TOL:
                 self.result.assumed.setdefault(
                     "joints connect the frames that they name, which do not coincide in the file's configuration", []
                 ).append(title)

@@ -12,11 +12,11 @@ from ....errors import BadRequest
 from ....geometry.vectors import Array
 from ....mechanism.cameras import NamedCamera
 from ....mechanism.model import Coupling, JointType, Limits, Link, Motor
-from ....mechanism.screws import elementary
+from ....mechanism.screws import split_elementary
 from ... import xml
 from ...elements import XmlReader
 from ...jointgraph import LOOP_TYPES, ORIGIN, FrameSpec, JointSpec
-from ...observation_text import ObservationSpec, spec_of
+from ...observation_text import ObservationSpec, parse_observe_attributes
 
 TREE_TYPES = {
     "revolute": JointType.REVOLUTE,
@@ -48,7 +48,7 @@ class UrdfReader(XmlReader):
 
     def elements(self) -> None:
         """Read links, joints and loops, then the elements that name them."""
-        for element in xml.children(self.root):
+        for element in xml.list_children(self.root):
             if element.tag == "link":
                 self.link(element)
             elif element.tag == "joint":
@@ -62,7 +62,7 @@ class UrdfReader(XmlReader):
         for element in self.root.findall("coupling"):
             self.coupling(element, names)
 
-    def check_link(
+    def is_known_link(
         self, link: str | None, line: int | None, what: str, names: Mapping[str, object] | None = None
     ) -> bool:
         """Return True if a link (or another of ``names``) exists; None was reported before."""
@@ -80,15 +80,15 @@ class UrdfReader(XmlReader):
         if name is None:
             return
         if name in self.links:
-            self.defect(xml.line(element), "second link of the same name", name)
+            self.defect(xml.get_line(element), "second link of the same name", name)
             return
-        self.links[name] = Link(name, xml=xml.unknown(element, ["name"], []), line=xml.line(element))
+        self.links[name] = Link(name, xml=xml.list_unknown(element, ["name"], []), line=xml.get_line(element))
 
     def joint(self, element: xml.Element) -> None:
         """Read a ``<joint>`` of the tree."""
         for mimic in element.findall("mimic"):
             self.defect(
-                xml.line(mimic),
+                xml.get_line(mimic),
                 "<mimic>: the native format has <coupling> instead; joint",
                 element.get("name"),
                 "a <coupling> with predecessor, successor and ratio",
@@ -108,11 +108,11 @@ class UrdfReader(XmlReader):
         for number, tag in enumerate(tags):
             end = self.only(element, tag)
             if end is None:
-                self.defect(xml.line(element), f"{element.tag} without <{tag}>", element.get("name"))
-                found.append(FrameSpec(None, ORIGIN, xml.line(element)))
+                self.defect(xml.get_line(element), f"{element.tag} without <{tag}>", element.get("name"))
+                found.append(FrameSpec(None, ORIGIN, xml.get_line(element)))
             else:
                 X = frames[number] if frames else self.origin(end)
-                found.append(FrameSpec(self.attribute(end, "link"), X, xml.line(end)))
+                found.append(FrameSpec(self.attribute(end, "link"), X, xml.get_line(end)))
         return found[0], found[1]
 
     def add(
@@ -122,16 +122,16 @@ class UrdfReader(XmlReader):
         name, kind = self.attribute(element, "name"), self.attribute(element, "type")
         type_ = None if kind is None else types.get(kind)
         if kind is not None and type_ is None:
-            self.defect(xml.line(element), f"unknown {element.tag} type", kind, ", ".join(types))
+            self.defect(xml.get_line(element), f"unknown {element.tag} type", kind, ", ".join(types))
         axes = self.axes(element, type_)
         limits = self.limits(element, kind)
         if name is None:
             return
         if name in self.tree or name in self.loops:
-            self.defect(xml.line(element), f"second joint or loop of the same name ({element.tag})", name)
+            self.defect(xml.get_line(element), f"second joint or loop of the same name ({element.tag})", name)
             return
-        rest = xml.unknown(element, ["name", "type"], [*tags, "axis", "axis2", "limit"])
-        joint = JointSpec(name, type_, ends, axes, limits, rest, xml.line(element), in_tree=element.tag == "joint")
+        rest = xml.list_unknown(element, ["name", "type"], [*tags, "axis", "axis2", "limit"])
+        joint = JointSpec(name, type_, ends, axes, limits, rest, xml.get_line(element), in_tree=element.tag == "joint")
         if not joint.in_tree:
             self.loops[name] = joint
         elif type_ is JointType.PLANAR:
@@ -155,7 +155,7 @@ class UrdfReader(XmlReader):
                 self.defect(joint.line, "link name already used by a planar joint", name)
             self.links.setdefault(name, Link(name, line=joint.line))
         ends = [joint.ends[0], *(FrameSpec(name, ORIGIN, joint.line) for name in names[:2]), joint.ends[1]]
-        for number, (kind, axis) in enumerate(elementary(JointType.PLANAR, joint.axes)):
+        for number, (kind, axis) in enumerate(split_elementary(JointType.PLANAR, joint.axes)):
             name = names[number]
             if name in self.tree or name in self.loops:
                 self.defect(joint.line, "joint name already used by a planar joint", name)
@@ -178,28 +178,28 @@ class UrdfReader(XmlReader):
         """Read a ``<coupling>``; ``names`` are those of the ones before it."""
         name = self.attribute(element, "name")
         if name in names:
-            self.defect(xml.line(element), "second coupling of the same name", name)
+            self.defect(xml.get_line(element), "second coupling of the same name", name)
         names.add(name or "")
         tags = ("predecessor", "successor")
         one, two = self.ends(element, tags, (ORIGIN, ORIGIN))
         for end, tag in zip((one, two), tags, strict=True):
-            self.check_link(end.link, end.line, f"{tag} of a coupling: unknown link")
+            self.is_known_link(end.link, end.line, f"{tag} of a coupling: unknown link")
         if one.link and one.link == two.link:
             self.defect(two.line, "successor of a coupling is its predecessor", two.link, "another link")
         ratio = self.only(element, "ratio")
         if ratio is None:
-            self.defect(xml.line(element), "coupling without <ratio>", name)
+            self.defect(xml.get_line(element), "coupling without <ratio>", name)
         elif self.attribute(ratio, "value") is not None:
             value = float(self.numbers(ratio, "value", (1,))[0])
             if value == 0:
                 self.defect(
-                    xml.line(ratio),
+                    xml.get_line(ratio),
                     "ratio of a coupling would fix its second joint",
                     ratio.get("value"),
                     "a number other than 0",
                 )
             if name and one.link and two.link:
-                self.couplings.append(Coupling(name, one.link, two.link, value, xml.line(element)))
+                self.couplings.append(Coupling(name, one.link, two.link, value, xml.get_line(element)))
 
     def sights(self, own: xml.Element) -> tuple[list[ObservationSpec], list[NamedCamera]]:
         """Return the observations in ``<hrsynth>`` other than directions by its own camera, and the named cameras."""
@@ -213,20 +213,20 @@ class UrdfReader(XmlReader):
                     if image is not None and image.get(key) is not None:
                         size[number] = float(self.numbers(image, key, (1,))[0])
                         if not size[number] > 0:  # type: ignore[operator]
-                            self.defect(xml.line(image), f"{key} of <image>", image.get(key), "more than 0")
+                            self.defect(xml.get_line(image), f"{key} of <image>", image.get(key), "more than 0")
                 if name is not None and link is not None:
                     width, height = (None if each is None else int(each) for each in size[1:])
-                    cameras.append(NamedCamera(name, link, X, size[0], width, height, xml.line(element)))
+                    cameras.append(NamedCamera(name, link, X, size[0], width, height, xml.get_line(element)))
         for element in own.findall("observe"):
             if is_sight(element):
                 try:
                     said = {str(key): str(value) for key, value in element.attrib.items()}
-                    specs.append(spec_of(said, xml.line(element)))
+                    specs.append(parse_observe_attributes(said, xml.get_line(element)))
                     for key in ("at", "axis", "radius"):
                         self.digits.read(element.get(key, ""))
                 except BadRequest as error:
                     value = None if error.got is None else str(error.got)
-                    self.defect(xml.line(element), error.problem, value, error.expected)
+                    self.defect(xml.get_line(element), error.problem, value, error.expected)
         return specs, cameras
 
     def check_ends(self, loop: str = "loop") -> None:
@@ -234,7 +234,7 @@ class UrdfReader(XmlReader):
         ``loop``."""
         for name, joint in self.joints.items():
             for end in joint.ends:
-                self.check_link(end.link, end.line, f"{'joint' if joint.in_tree else loop} {name!r}: unknown link")
+                self.is_known_link(end.link, end.line, f"{'joint' if joint.in_tree else loop} {name!r}: unknown link")
             if joint.ends[0].link is not None and joint.ends[0].link == joint.ends[1].link:
                 self.defect(joint.line, f"{name!r} connects a link to itself", joint.ends[0].link)
 
@@ -261,7 +261,7 @@ def is_sight(element: xml.Element) -> bool:
     return element.get("kind") is not None or element.get("camera") is not None
 
 
-def simple_transmission(title: str, joint: str, interface: str | None = INTERFACE) -> xml.Element:
+def build_transmission(title: str, joint: str, interface: str | None = INTERFACE) -> xml.Element:
     """Return the transmission of a motor known by its name only; other parsers require an interface."""
     element = etree.Element("transmission", name=title)
     etree.SubElement(element, "type").text = "transmission_interface/SimpleTransmission"

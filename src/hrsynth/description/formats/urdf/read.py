@@ -10,10 +10,10 @@ import numpy as np
 from ....mechanism.model import JointType, Limits, Link, Motor
 from ....mechanism.observations.direction import Direction
 from ... import xml
-from ...elements import TURNS, sound_limits
+from ...elements import TURNS, read_sound_limits
 from ...file_format import RobotFile
-from ...jointgraph import CouplingSpec, JointGraph, comma_list
-from ..extensions import DRAKE, is_drake, local
+from ...jointgraph import CouplingSpec, JointGraph, join_names
+from ..extensions import DRAKE, is_drake, strip_namespace
 from .conventions import CONVENTIONS
 from .elements import TREE_TYPES, UrdfReader, is_sight
 from .names import NAMES
@@ -57,8 +57,10 @@ class _TolerantReader(UrdfReader):
         for kind, text in self.notes:
             graph.note(kind, text)
         graph.joints = {name: replace(joint, motor=self.motors.get(name)) for name, joint in self.joints.items()}
-        closing = [str(each.tag) for each in xml.children(self.root) if is_drake(each) and local(each) in DRAKE]
-        graph.rest = list(xml.unknown(self.root, ["name"], [*_KNOWN, *closing]))
+        closing = [
+            str(each.tag) for each in xml.list_children(self.root) if is_drake(each) and strip_namespace(each) in DRAKE
+        ]
+        graph.rest = list(xml.list_unknown(self.root, ["name"], [*_KNOWN, *closing]))
         self.add_gears(graph)
         for convention in CONVENTIONS:
             if convention.tag is not None or frames:
@@ -84,14 +86,14 @@ class _TolerantReader(UrdfReader):
                 for key, default in (("multiplier", 1.0), ("offset", 0.0))
             )
             if name is not None and driver is not None:
-                self.mimics.append(CouplingSpec(f"mimic_{name}", driver, name, ratio, offset, xml.line(mimic)))
+                self.mimics.append(CouplingSpec(f"mimic_{name}", driver, name, ratio, offset, xml.get_line(mimic)))
 
     def limits(self, element: xml.Element, kind: str | None) -> Limits | None:
         limit = element.find("limit")
         if limit is None:
             return None
         free = limit.get("free", "").split()
-        return sound_limits(lambda key: None if key in free else limit.get(key), bounded=kind != "continuous")
+        return read_sound_limits(lambda key: None if key in free else limit.get(key), bounded=kind != "continuous")
 
     def transmission(self, element: xml.Element) -> None:
         name, joints = element.get("name") or "motor", self.joints
@@ -112,7 +114,7 @@ class _TolerantReader(UrdfReader):
         self.check_ends("joint")
         self.require_some(self.links, "links", self.root)
         for ring in self.rings():
-            names = comma_list(joint.name for joint in ring)
+            names = join_names(joint.name for joint in ring)
             self.defect(ring[0].line, "joints that form a cycle", names, "a tree with one root")
         self.require_sound()
 
@@ -142,7 +144,7 @@ class _TolerantReader(UrdfReader):
             for tag in ("platform", "camera"):
                 element = next((each for each in own.findall(tag) if each.get("name") is None), None)
                 link = None if element is None else element.get("link")
-                if element is not None and self.check_link(link, xml.line(element), f"{tag}: unknown link"):
+                if element is not None and self.is_known_link(link, xml.get_line(element), f"{tag}: unknown link"):
                     setattr(graph, tag, link)
                     graph.turns = TURNS.get(element.get("turns", ""), graph.turns)
             graph.sights, graph.cameras = self.sights(own)
@@ -151,6 +153,6 @@ class _TolerantReader(UrdfReader):
                 if is_sight(element):
                     continue
                 link, leg = element.get("link"), element.get("leg")
-                if self.check_link(link, xml.line(element), "observe: unknown link") and leg and link:
+                if self.is_known_link(link, xml.get_line(element), "observe: unknown link") and leg and link:
                     axis = self.direction(element, "axis", (0, 0, 1))
-                    graph.observations.append(Direction(leg, link, np.asarray(axis), line=xml.line(element)))
+                    graph.observations.append(Direction(leg, link, np.asarray(axis), line=xml.get_line(element)))

@@ -7,7 +7,7 @@ import json
 import sys
 from pathlib import Path
 
-from ....budgets import LARGEST_FILE, MOST_ELEMENTS, XACRO_SECONDS
+from ....budgets import ROBOT_FILE_MAX_BYTES, XACRO_TIMEOUT_S, XML_ELEMENTS_MAX
 from ....errors import MissingExtra
 from ... import xml
 
@@ -31,28 +31,35 @@ def expand(path: Path) -> xml.Element:
     if importlib.util.find_spec("xacro") is None:
         raise MissingExtra(f"{path}: a xacro file", "xacro")
     process = Path(__file__).with_name("xacro_process.py")
-    command = [sys.executable, "-P", str(process), str(path.resolve()), str(LARGEST_FILE), str(MOST_ELEMENTS)]
+    command = [
+        sys.executable,
+        "-P",
+        str(process),
+        str(path.resolve()),
+        str(ROBOT_FILE_MAX_BYTES),
+        str(XML_ELEMENTS_MAX),
+    ]
     try:
-        run = subprocess.run(command, capture_output=True, text=True, timeout=XACRO_SECONDS, check=False)
+        run = subprocess.run(command, capture_output=True, text=True, timeout=XACRO_TIMEOUT_S, check=False)
     except subprocess.TimeoutExpired:
-        raise xml.refusal(path, "xacro did not finish", f"{XACRO_SECONDS} seconds") from None
+        raise xml.make_file_error(path, "xacro did not finish", f"{XACRO_TIMEOUT_S} seconds") from None
     if run.returncode < 0:
-        raise xml.refusal(path, "xacro was stopped", f"{XACRO_SECONDS} seconds and 900 MB of memory")
+        raise xml.make_file_error(path, "xacro was stopped", f"{XACRO_TIMEOUT_S} seconds and 900 MB of memory")
     if run.returncode:
-        file, line, said = _last_message(run.stderr)
-        raise xml.refusal(
-            path if file is None else xml.beside(path, file),
+        file, line, said = _read_last_message(run.stderr)
+        raise xml.make_file_error(
+            path if file is None else xml.shorten_path(path, file),
             f"xacro refuses it: {said[:300]}",
             "a file that xacro expands",
             line=line,
         )
     places, _, text = run.stdout.partition("\n")
-    root = xml.document(text, str(path))
+    root = xml.parse_document(text, str(path))
     xml.give_places(root, path, json.loads(places))
     return root
 
 
-def _last_message(errors: str) -> tuple[str | None, int | None, str]:
+def _read_last_message(errors: str) -> tuple[str | None, int | None, str]:
     """Return file, line and text of the last message of the process."""
     last = "".join([line for line in errors.splitlines() if line.strip()][-1:])
     try:

@@ -25,9 +25,9 @@ from xml.dom import expatbuilder, minidom
 LIMITS = {"AS": 900_000_000, "CPU": 4, "FSIZE": 0, "NOFILE": 64, "CORE": 0, "NPROC": 0}
 """Limits of the process by the names of ``resource``: bytes, seconds, numbers. That of processes (NPROC) does not hold
 for root."""
-LEVELS = 4
+PACKAGE_FOLDER_LEVELS_MAX = 4
 """Number of folders above the file that are searched for a package's files."""
-LONGEST_POWER = 10_000
+XACRO_POWER_BITS_MAX = 10_000
 """Largest number of bits of a power of integers."""
 MARK = "/find:package"
 
@@ -57,7 +57,7 @@ CONSTANTS = {name: value for name, value in vars(math).items() if isinstance(val
 TEXT_METHODS = ("lower", "upper", "strip", "split", "replace", "startswith", "endswith")
 
 
-def in_list(call: Callable[..., Any]) -> Callable[..., list[Any]]:
+def list_results(call: Callable[..., Any]) -> Callable[..., list[Any]]:
     """Return a function that returns a list of an iterator's values."""
     return lambda *arguments: list(call(*arguments))
 
@@ -82,16 +82,16 @@ PYTHON: Functions = {
     "str": str,
     "sum": sum,
     "tuple": tuple,
-    "range": in_list(range),
-    "reversed": in_list(reversed),
-    "zip": in_list(zip),
-    "enumerate": in_list(enumerate),
+    "range": list_results(range),
+    "reversed": list_results(reversed),
+    "zip": list_results(zip),
+    "enumerate": list_results(enumerate),
 }
 
 
-def power(base: Any, exponent: Any) -> Any:
+def raise_power(base: Any, exponent: Any) -> Any:
     """Return a power, in floats if the integer would be long."""
-    if isinstance(base, int) and isinstance(exponent, int) and abs(base).bit_length() * exponent > LONGEST_POWER:
+    if isinstance(base, int) and isinstance(exponent, int) and abs(base).bit_length() * exponent > XACRO_POWER_BITS_MAX:
         return float(base) ** float(exponent)
     return base**exponent
 
@@ -142,7 +142,7 @@ class Expression:
 
     def value_of_BinOp(self, node: ast.BinOp) -> Any:
         left, right = self.value(node.left), self.value(node.right)
-        return power(left, right) if isinstance(node.op, ast.Pow) else OPERATORS[type(node.op)](left, right)
+        return raise_power(left, right) if isinstance(node.op, ast.Pow) else OPERATORS[type(node.op)](left, right)
 
     def value_of_BoolOp(self, node: ast.BoolOp) -> Any:
         found = self.value(node.values[0])
@@ -202,11 +202,11 @@ def restrict(xacro: Any, substitution: Any, folder: Path) -> None:
     """Make the package evaluate its expressions here, and read files of the folder, or of its package, only."""
 
     def locate(spec: str) -> str:
-        return located(spec, folder)
+        return locate_include(spec, folder)
 
     def read(name: str) -> Any:
         path = Path(name).resolve()
-        if not path.is_relative_to(package_folders(folder)[-1]):
+        if not path.is_relative_to(list_package_folders(folder)[-1]):
             raise ValueError(f"{name} lies outside of the file's package")
         return open(path, encoding="utf-8")
 
@@ -249,7 +249,7 @@ def restrict(xacro: Any, substitution: Any, folder: Path) -> None:
     substitution._eval_env, substitution._eval_optenv = lambda variable: "", lambda variable, default="": default
 
 
-def located(spec: str, folder: Path) -> str:
+def locate_include(spec: str, folder: Path) -> str:
     """Return the file that an include names. Raises ``ValueError`` for a file outside of the folder (of the package),
     and for a pattern of files."""
     if any(letter in spec for letter in "*?["):
@@ -258,7 +258,7 @@ def located(spec: str, folder: Path) -> str:
         rest = Path(spec.split(MARK)[-1].lstrip("/"))
         if ".." in rest.parts:
             raise ValueError(f"{rest} leaves the package")
-        for home in package_folders(folder):
+        for home in list_package_folders(folder):
             for start in range(len(rest.parts)):
                 candidate = home.joinpath(*rest.parts[start:])
                 if candidate.is_file():
@@ -270,11 +270,11 @@ def located(spec: str, folder: Path) -> str:
     return str(path)
 
 
-def package_folders(folder: Path) -> list[Path]:
+def list_package_folders(folder: Path) -> list[Path]:
     """Return the folders in which a package's files may lie: the file's own, and those up to the one with the package's
     manifest; without one, the folder above, unless that is a root or a user's."""
     above = [folder, *folder.parents]
-    for k, each in enumerate(above[: LEVELS + 1]):
+    for k, each in enumerate(above[: PACKAGE_FOLDER_LEVELS_MAX + 1]):
         if any((each / name).is_file() for name in ("package.xml", "model.config")):
             return above[: k + 1]
     shared = Path.home(), Path(os.environ.get("TMPDIR", "/tmp"))
@@ -299,7 +299,7 @@ class PlacedBuilder(expatbuilder.ExpatBuilderNS):
         raise ValueError("a document type declaration is not allowed")
 
 
-def watched(xacro: Any) -> list[Any]:
+def track_places(xacro: Any) -> list[Any]:
     """Make the package keep the places of elements; the list holds the element that it currently processes."""
     at: list[Any] = []
 
@@ -326,7 +326,7 @@ def watched(xacro: Any) -> list[Any]:
     return at
 
 
-def wrong(xacro: Any, error: Exception, at: list[Any]) -> dict[str, Any]:
+def describe_error(xacro: Any, error: Exception, at: list[Any]) -> dict[str, Any]:
     """Return the text of an error, with file and line."""
     files = [each for each in getattr(xacro, "filestack", None) or [] if each]
     file, line = getattr(at[0], "place", (None, None)) if at else (None, None)
@@ -356,7 +356,7 @@ def main(name: str, largest: str, most: str) -> None:
     from xacro import substitution_args
 
     folder = Path(name).resolve().parent
-    at, errors = watched(xacro), sys.stderr
+    at, errors = track_places(xacro), sys.stderr
     try:
         sys.stderr = open(os.devnull, "w")  # noqa: SIM115 (what the package warns of, without a limit)
         restrict(xacro, substitution_args, folder)
@@ -368,7 +368,7 @@ def main(name: str, largest: str, most: str) -> None:
         if len(places) > int(most):
             raise ValueError(f"too large when expanded: got {len(places)} elements, expected up to {most}")
     except Exception as error:
-        errors.write(json.dumps(wrong(xacro, error, at)))
+        errors.write(json.dumps(describe_error(xacro, error, at)))
         sys.exit(1)
     sys.stdout.write(json.dumps(places) + "\n" + text)
 

@@ -13,9 +13,9 @@ def _pack(text: str, path: Path) -> bytes:
     """Return the content of a file: ``.usdc`` is binary."""
     if path.suffix.lower() != ".usdc":
         return text.encode()
-    from .stage import binary
+    from .stage import convert_to_binary
 
-    return binary(text, path)
+    return convert_to_binary(text, path)
 
 
 DIALECT = FileFormat(

@@ -10,21 +10,21 @@ from typing import Any
 
 import numpy as np
 
-from ....budgets import LARGEST_NUMBER
+from ....budgets import FILE_NUMBER_MAX
 from ....errors import BadRobotFile, Defect
-from ....geometry.so3 import rotation_of, turn_about
-from ....geometry.vectors import Array, frozen, inverse, pose, rotation_about, unit
-from ....mechanism.model import JointType, Limits, Link, Motor, fresh_name
-from ....tolerances import EXACT, NOISE, SINGLE, WITHOUT_DIRECTION
+from ....geometry.so3 import convert_from_quaternion, turn_about
+from ....geometry.vectors import Array, build_pose, freeze_array, invert_pose, normalise_vector, rotate_about_axis
+from ....mechanism.model import JointType, Limits, Link, Motor, make_fresh_name
+from ....tolerances import EXACT_INCIDENCE_TOL, INCIDENCE_TOL, SINGLE_PRECISION_TOL, VECTOR_LENGTH_MIN
 from ... import xml
 from ...annotations import PREFIX, drop_world, read_annotation
-from ...chains import part
-from ...contents import Content, Inertial, Solid, along_z, fragments
+from ...chains import name_chain_joint
+from ...contents import Content, Inertial, Solid, rotate_z_to, write_fragments
 from ...file_format import RobotFile
-from ...jointgraph import ORIGIN, CouplingSpec, FrameSpec, JointGraph, JointSpec, comma_list
-from ...jointmotion import residual
-from ...numerals import exact_vector
-from .stage import prims
+from ...jointgraph import ORIGIN, CouplingSpec, FrameSpec, JointGraph, JointSpec, join_names
+from ...jointmotion import compute_closure_residual
+from ...numerals import format_exact_vector
+from .stage import read_prims
 
 AXES = {"X": np.eye(3)[0], "Y": np.eye(3)[1], "Z": np.eye(3)[2]}
 _KINDS = {
@@ -42,12 +42,12 @@ def read(file: RobotFile) -> JointGraph:
     """Return the joint graph of a USD stage. Raises ``BadRobotFile`` with all its defects, ``MissingExtra`` without the
     package of OpenUSD."""
     if file.start.startswith(b"PK"):
-        raise xml.refusal(
+        raise xml.make_file_error(
             file.path,
             "a zip archive, such as a package of USD files",
             "the robot file in it, unzipped",
         )
-    told = prims(file.path)
+    told = read_prims(file.path)
     return _StageReader(str(file.path), told).graph()
 
 
@@ -66,7 +66,7 @@ class _Prim:
     M: Array = field(default_factory=lambda: np.eye(3))
     """Rotation and scale of its coordinates (3, 3), in metres."""
 
-    def has(self, api: str) -> bool:
+    def has_api(self, api: str) -> bool:
         return any(each == api or each.startswith(api + ":") for each in self.apis)
 
 
@@ -93,7 +93,7 @@ class _StageReader:
         told = self.told
         self.metres = self._positive("metersPerUnit", told["metres"])
         self.kilograms = self._positive("kilogramsPerUnit", told["kilograms"])
-        self.up = pose(rotation=rotation_about((1, 0, 0), math.pi / 2)) if told["up"] == "Y" else np.eye(4)
+        self.up = build_pose(rotation=rotate_about_axis((1, 0, 0), math.pi / 2)) if told["up"] == "Y" else np.eye(4)
         self.require_sound()
         self.prims = {each["path"]: self._prim(each) for each in told["prims"]}
         own = [each for each in self.prims.values() if f"{PREFIX}:says" in each.values]
@@ -102,9 +102,9 @@ class _StageReader:
         if not told["metres_told"]:
             graph.note("assumption", "lengths are in centimetres, USD's default without metersPerUnit")
         if told["missing"]:
-            graph.note("ignored", f"contents of missing files: {comma_list(told['missing'])}")
+            graph.note("ignored", f"contents of missing files: {join_names(told['missing'])}")
         for prim in self.prims.values():
-            if prim.has("PhysicsRigidBodyAPI"):
+            if prim.has_api("PhysicsRigidBodyAPI"):
                 self._body(prim)
         joints = [prim for prim in self.prims.values() if prim.told["joint"]]
         if not self.bodies:
@@ -128,7 +128,7 @@ class _StageReader:
                 (
                     self.bodies[path]
                     for path, prim in self.prims.items()
-                    if path in self.bodies and prim.has("PhysicsArticulationRootAPI")
+                    if path in self.bodies and prim.has_api("PhysicsArticulationRootAPI")
                 ),
                 None,
             )
@@ -141,7 +141,7 @@ class _StageReader:
         return drop_world(graph)
 
     def _positive(self, what: str, value: float) -> float:
-        if not 0 < value <= LARGEST_NUMBER:
+        if not 0 < value <= FILE_NUMBER_MAX:
             self.defect("/", what, value, "a number above 0")
         return float(value)
 
@@ -153,18 +153,18 @@ class _StageReader:
         if told["X"] is None:
             return found
         W = np.array(told["X"], dtype=float).T
-        if not np.all(np.abs(W) <= LARGEST_NUMBER):
+        if not np.all(np.abs(W) <= FILE_NUMBER_MAX):
             self.defect(found.path, "transform not finite or too large")
             return found
         found.M = self.metres * (self.up[:3, :3] @ W[:3, :3])
         U, sizes, V = np.linalg.svd(W[:3, :3])
-        if not sizes[-1] > WITHOUT_DIRECTION * max(1.0, sizes[0]):
-            if told["shape"] or found.has("PhysicsRigidBodyAPI"):
+        if not sizes[-1] > VECTOR_LENGTH_MIN * max(1.0, sizes[0]):
+            if told["shape"] or found.has_api("PhysicsRigidBodyAPI"):
                 self.defect(found.path, "transform with zero volume")
             return found
-        R = W[:3, :3] if np.max(np.abs(W[:3, :3].T @ W[:3, :3] - np.eye(3))) < EXACT else U @ V
+        R = W[:3, :3] if np.max(np.abs(W[:3, :3].T @ W[:3, :3] - np.eye(3))) < EXACT_INCIDENCE_TOL else U @ V
         R = -R if np.linalg.det(R) < 0 else R
-        found.X = frozen(pose(self.metres * (self.up[:3, :3] @ W[:3, 3]), self.up[:3, :3] @ R))
+        found.X = freeze_array(build_pose(self.metres * (self.up[:3, :3] @ W[:3, 3]), self.up[:3, :3] @ R))
         return found
 
     def _body(self, prim: _Prim) -> None:
@@ -198,71 +198,80 @@ class _StageReader:
             else:
                 solids[carrier].append(solid)
         if lost:
-            self.result.note("ignored", f"{len(lost)} shapes that other formats do not have: {comma_list(lost)}")
+            self.result.note("ignored", f"{len(lost)} shapes that other formats do not have: {join_names(lost)}")
         for path, link in self.bodies.items():
-            content = fragments(Content(inertials[path], tuple(solids[path])))
+            content = write_fragments(Content(inertials[path], tuple(solids[path])))
             self.result.links[link] = Link(link, xml=content)
 
     def _inertial(self, prim: _Prim) -> Inertial | None:
         """Return an inertia of UsdPhysics; a mass or moments of zero are computed by the simulator, and left out."""
         values = prim.values
-        mass = _number(values.get("physics:mass"))
+        mass = _round_single(values.get("physics:mass"))
         if not mass > 0:
             return None
-        centre = _vector(values.get("physics:centerOfMass"))
+        centre = _read_vector(values.get("physics:centerOfMass"))
         centre = np.zeros(3) if centre is None else prim.X[:3, :3].T @ prim.M @ centre
-        moments, turn = _vector(values.get("physics:diagonalInertia")), _quaternion(values.get("physics:principalAxes"))
+        moments, turn = (
+            _read_vector(values.get("physics:diagonalInertia")),
+            _read_quaternion(values.get("physics:principalAxes")),
+        )
         if moments is None or not np.any(moments):
-            return Inertial(mass * self.kilograms, frozen(pose(centre)))
-        R = np.eye(3) if turn is None else rotation_of(unit(turn))
+            return Inertial(mass * self.kilograms, freeze_array(build_pose(centre)))
+        R = np.eye(3) if turn is None else convert_from_quaternion(normalise_vector(turn))
         inertia = self.kilograms * self.metres**2 * (R @ np.diag(moments) @ R.T)
         exact = values.get(f"{PREFIX}:inertia")
         if isinstance(exact, list) and len(exact) == 6:
             xx, yy, zz, xy, xz, yz = exact
             tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-            inertia = tensor if np.max(np.abs(tensor - inertia)) <= SINGLE * np.max(np.abs(inertia)) else inertia
-        return Inertial(mass * self.kilograms, frozen(pose(centre)), frozen(inertia))
+            inertia = (
+                tensor
+                if np.max(np.abs(tensor - inertia)) <= SINGLE_PRECISION_TOL * np.max(np.abs(inertia))
+                else inertia
+            )
+        return Inertial(mass * self.kilograms, freeze_array(build_pose(centre)), freeze_array(inertia))
 
     def _solid(self, prim: _Prim, body: _Prim) -> Solid | None:
         """Return a shape in the frame of its body, if its kind and scale are known."""
-        values, X = prim.values, inverse(body.X) @ prim.X
+        values, X = prim.values, invert_pose(body.X) @ prim.X
         stretch = prim.X[:3, :3].T @ prim.M
         sizes = np.diag(stretch)
-        role = "collision" if self._collides(prim, body) else "visual"
+        role = "collision" if self._has_collision(prim, body) else "visual"
         name = prim.name if values.get(f"{PREFIX}:name") else None
         colour = tuple(prim.told["colour"]) if prim.told["colour"] is not None and role == "visual" else None
-        if np.max(np.abs(stretch - np.diag(sizes))) > SINGLE * np.max(np.abs(sizes)) or not np.all(sizes > 0):
+        if np.max(np.abs(stretch - np.diag(sizes))) > SINGLE_PRECISION_TOL * np.max(np.abs(sizes)) or not np.all(
+            sizes > 0
+        ):
             return None
         if f"{PREFIX}:mesh" in values or prim.kind == "Mesh":
             address = values.get(f"{PREFIX}:mesh")
             own = f"{self.file.rpartition('/')[2]}#{prim.path}"
-            scale = _vector(values.get(f"{PREFIX}:scale"))
+            scale = _read_vector(values.get(f"{PREFIX}:scale"))
             factors = tuple(float(v) for v in (sizes if address is None or scale is None else scale))
-            return Solid("mesh", (), frozen(X), role, name, colour, str(address or own), factors)
+            return Solid("mesh", (), freeze_array(X), role, name, colour, str(address or own), factors)
         along = AXES.get(values.get("axis", "Z"), AXES["Z"])
         long = float(along @ sizes)
         across = [float(size) for size, each in zip(sizes, along, strict=True) if not each]
-        rounds = max(sizes) - min(sizes) <= SINGLE * max(sizes)
-        radius, height = (_number(values.get(key)) for key in ("radius", "height"))
-        turned = frozen(X @ pose(rotation=along_z(along))) if not along[2] else frozen(X)
+        rounds = max(sizes) - min(sizes) <= SINGLE_PRECISION_TOL * max(sizes)
+        radius, height = (_round_single(values.get(key)) for key in ("radius", "height"))
+        turned = freeze_array(X @ build_pose(rotation=rotate_z_to(along))) if not along[2] else freeze_array(X)
         if prim.kind == "Cube":
-            edges = tuple(_number(values.get("size", 2.0)) * float(size) for size in sizes)
-            return Solid("box", edges, frozen(X), role, name, colour) if min(edges) > 0 else None
+            edges = tuple(_round_single(values.get("size", 2.0)) * float(size) for size in sizes)
+            return Solid("box", edges, freeze_array(X), role, name, colour) if min(edges) > 0 else None
         if prim.kind == "Sphere" and rounds and radius > 0:
-            return Solid("sphere", (radius * float(sizes[0]),), frozen(X), role, name, colour)
+            return Solid("sphere", (radius * float(sizes[0]),), freeze_array(X), role, name, colour)
         if (
             prim.kind in ("Cylinder", "Capsule")
-            and abs(across[0] - across[1]) <= SINGLE * across[0]
+            and abs(across[0] - across[1]) <= SINGLE_PRECISION_TOL * across[0]
             and min(radius, height) > 0
             and (prim.kind == "Cylinder" or rounds)
         ):
             return Solid(prim.kind.lower(), (radius * across[0], height * long), turned, role, name, colour)
         return None
 
-    def _collides(self, prim: _Prim, body: _Prim) -> bool:
+    def _has_collision(self, prim: _Prim, body: _Prim) -> bool:
         path = prim.path
         while len(path) >= len(body.path):
-            if path in self.prims and self.prims[path].has("PhysicsCollisionAPI"):
+            if path in self.prims and self.prims[path].has_api("PhysicsCollisionAPI"):
                 return True
             path = path.rpartition("/")[0]
         return bool(prim.told["guide"])
@@ -290,7 +299,7 @@ class _StageReader:
         if one.link == two.link:
             self.defect(prim.path, "joint from a body to itself", one.link, "two bodies (physics:body0, physics:body1)")
             return
-        name = fresh_name(prim.name, graph.joints)
+        name = make_fresh_name(prim.name, graph.joints)
         free = self._freedoms(prim)
         excluded = values.get("physics:excludeFromArticulation") is True and len(free) < 6
         before = set(graph.joints)
@@ -303,21 +312,28 @@ class _StageReader:
         if len(targets) > 1 or (targets and targets[0] not in self.prims):
             self.defect(prim.path, f"physics:body{side}", " ".join(targets)[:80], "one prim of the stage")
             return None
-        turn = _quaternion(prim.values.get(f"physics:localRot{side}"), prim.values.get(f"{PREFIX}:localRot{side}"))
-        place = _vector(prim.values.get(f"physics:localPos{side}"), prim.values.get(f"{PREFIX}:localPos{side}"))
-        if turn is None or place is None or not np.all(np.abs(place) <= LARGEST_NUMBER):
+        turn = _read_quaternion(prim.values.get(f"physics:localRot{side}"), prim.values.get(f"{PREFIX}:localRot{side}"))
+        place = _read_vector(prim.values.get(f"physics:localPos{side}"), prim.values.get(f"{PREFIX}:localPos{side}"))
+        if turn is None or place is None or not np.all(np.abs(place) <= FILE_NUMBER_MAX):
             self.defect(prim.path, f"the joint's frame on physics:body{side}", None, "a finite position, a rotation")
             return None
-        self.result.digits.read(exact_vector([*place, *map(_number, turn)]))
+        self.result.digits.read(format_exact_vector([*place, *map(_round_single, turn)]))
         self.result.digits.length(float(np.linalg.norm(turn)))
         if not targets:
-            return FrameSpec(self.world, frozen(self.up @ pose(self.metres * place, rotation_of(unit(turn)))))
+            return FrameSpec(
+                self.world,
+                freeze_array(
+                    self.up @ build_pose(self.metres * place, convert_from_quaternion(normalise_vector(turn)))
+                ),
+            )
         target, carrier = self.prims[targets[0]], self._carrier(targets[0])
-        X = target.X @ pose(target.X[:3, :3].T @ target.M @ place, rotation_of(unit(turn)))
+        X = target.X @ build_pose(
+            target.X[:3, :3].T @ target.M @ place, convert_from_quaternion(normalise_vector(turn))
+        )
         if carrier is None:
-            return FrameSpec(self.world, frozen(X))
+            return FrameSpec(self.world, freeze_array(X))
         body = self.prims[carrier]
-        return FrameSpec(self.bodies[carrier], frozen(X if carrier == "/" else inverse(body.X) @ X))
+        return FrameSpec(self.bodies[carrier], freeze_array(X if carrier == "/" else invert_pose(body.X) @ X))
 
     def _freedoms(self, prim: _Prim) -> tuple[str, ...]:
         """Return the directions that a joint leaves free: by its type, or for a D6 those that no limit locks."""
@@ -379,7 +395,7 @@ class _StageReader:
         parts = [(JointType.PRISMATIC, axis) for axis in slides] + [(JointType.REVOLUTE, axis) for axis in turns[::-1]]
         for number, (kind, axis) in enumerate(parts, 1):
             last = number == len(parts)
-            title = graph.fresh(part(name, number))
+            title = graph.fresh(name_chain_joint(name, number))
             if not last:
                 graph.links[title] = Link(title)
                 self.poses[title] = self.poses[str(ends[0].link)] @ ends[0].X
@@ -411,7 +427,11 @@ class _StageReader:
         values = {"lower": lower, "upper": upper}
         for key, value in values.items():
             exact = prim.values.get(f"{PREFIX}:{key}")
-            if isinstance(exact, float) and value is not None and abs(exact - value) <= SINGLE * max(1.0, abs(value)):
+            if (
+                isinstance(exact, float)
+                and value is not None
+                and abs(exact - value) <= SINGLE_PRECISION_TOL * max(1.0, abs(value))
+            ):
                 values[key] = exact
         for key in ("velocity", "effort"):
             exact = prim.values.get(f"{PREFIX}:{key}")
@@ -450,9 +470,9 @@ class _StageReader:
                     continue
                 exact = prim.values.get(f"{PREFIX}:ratio")
                 ratio = -float(gearing)
-                if isinstance(exact, float) and abs(exact - ratio) <= SINGLE * max(1.0, abs(ratio)):
+                if isinstance(exact, float) and abs(exact - ratio) <= SINGLE_PRECISION_TOL * max(1.0, abs(ratio)):
                     ratio = exact
-                offset = -_number(prim.values.get(f"{stem}offset")) * (math.pi / 180 if turns else self.metres)
+                offset = -_round_single(prim.values.get(f"{stem}offset")) * (math.pi / 180 if turns else self.metres)
                 label = prim.values.get(f"{PREFIX}:coupling")
                 title = label if isinstance(label, str) else self.result.fresh(f"mimic_{prim.name}")
                 self.result.gears.append(CouplingSpec(title, *names, ratio, offset or 0.0))
@@ -462,10 +482,15 @@ class _StageReader:
         apart = []
         for name, joint in graph.joints.items():
             T, S = joint.frames(self.poses)
-            D = inverse(T) @ S
-            if np.max(np.abs(D - np.eye(4))) <= EXACT:
+            D = invert_pose(T) @ S
+            if np.max(np.abs(D - np.eye(4))) <= EXACT_INCIDENCE_TOL:
                 continue
-            if residual(joint, T, S, max(1.0, *(float(np.linalg.norm(end.X[:3, 3])) for end in joint.ends))) > NOISE:
+            if (
+                compute_closure_residual(
+                    joint, T, S, max(1.0, *(float(np.linalg.norm(end.X[:3, 3])) for end in joint.ends))
+                )
+                > INCIDENCE_TOL
+            ):
                 if joint.in_tree:
                     apart.append(name)
                 continue
@@ -478,18 +503,18 @@ class _StageReader:
                 q = float(joint.axes[0] @ D[:3, 3])
             axes = joint.axes
             if kind is JointType.UNIVERSAL:
-                axes = frozen(D[:3, :3].T @ axes[0]), axes[1]
+                axes = freeze_array(D[:3, :3].T @ axes[0]), axes[1]
             limits = joint.limits
             if limits is not None and q:
                 lower, upper = (None if bound is None else bound - q for bound in (limits.lower, limits.upper))
                 limits = replace(limits, lower=lower, upper=upper)
-            near = replace(joint.ends[0], X=frozen(inverse(self.poses[joint.links[0]]) @ S))
+            near = replace(joint.ends[0], X=freeze_array(invert_pose(self.poses[joint.links[0]]) @ S))
             graph.joints[name] = replace(joint, ends=(near, joint.ends[1]), axes=axes, limits=limits)
         if apart:
             graph.note(
                 "assumption",
                 "the bodies of these joints do not lie where the joints put them, and are moved there: "
-                + comma_list(apart),
+                + join_names(apart),
             )
 
     def _says(self, prim: _Prim) -> None:
@@ -506,7 +531,7 @@ class _StageReader:
         gains: dict[str, bool] = {}
         for prim in joints:
             names = [each for each in self.titles.get(prim.path, []) if self.result.joints[each].kind.freedoms]
-            if prim.has("PhysicsDriveAPI"):
+            if prim.has_api("PhysicsDriveAPI"):
                 drives = [
                     value
                     for key, value in prim.values.items()
@@ -515,7 +540,7 @@ class _StageReader:
                 limp = any(
                     value == 0 for key, value in prim.values.items() if re.fullmatch(r"drive:\w+:physics:maxForce", key)
                 )
-                gains |= dict.fromkeys(names, any(_number(value) > 0 for value in drives) and not limp)
+                gains |= dict.fromkeys(names, any(_round_single(value) > 0 for value in drives) and not limp)
         actuators = [prim for prim in self.prims.values() if prim.kind == "MjcActuator"]
         for prim in actuators:
             targets = [each for path in prim.relations.get("mjc:target", []) for each in self.titles.get(path, [])]
@@ -526,7 +551,7 @@ class _StageReader:
         for name in driven:
             self.result.joints[name] = replace(self.result.joints[name], motor=Motor(f"motor_{name}"))
         if len(driven) < len(gains):
-            what = f"the motors are {comma_list(driven)}: the joints whose drives have gains (--motors changes them)"
+            what = f"the motors are {join_names(driven)}: the joints whose drives have gains (--motors changes them)"
             self.result.note("assumption", what)
 
 
@@ -535,31 +560,31 @@ def _is_locked(values: Mapping[str, Any], freedom: str) -> bool:
     return low is not None and high is not None and bool(low >= high)
 
 
-def _number(value: Any) -> float:
+def _round_single(value: Any) -> float:
     """Return a number of single precision as the decimals from which it was rounded."""
     if not isinstance(value, int | float) or not math.isfinite(value):
         return 0.0
     return float(str(np.float32(value))) if float(np.float32(value)) == value else float(value)
 
 
-def _vector(value: Any, exact: Any = None) -> Array | None:
+def _read_vector(value: Any, exact: Any = None) -> Array | None:
     """Return three finite numbers; those of double precision next to them if they are the same."""
     found = np.array(value, dtype=float) if isinstance(value, list) and len(value) == 3 else None
     if found is None or not np.all(np.isfinite(found)):
         return None
     if isinstance(exact, list) and len(exact) == 3:
         better = np.array(exact, dtype=float)
-        if np.max(np.abs(better - found)) <= SINGLE * max(1.0, float(np.max(np.abs(found)))):
+        if np.max(np.abs(better - found)) <= SINGLE_PRECISION_TOL * max(1.0, float(np.max(np.abs(found)))):
             return better
-    return np.array([_number(v) for v in found])
+    return np.array([_round_single(v) for v in found])
 
 
-def _quaternion(value: Any, exact: Any = None) -> Array | None:
+def _read_quaternion(value: Any, exact: Any = None) -> Array | None:
     """Return a quaternion w x y z as it is written, in the same manner; None if it is invalid."""
     found = np.array(value, dtype=float) if isinstance(value, list) and len(value) == 4 else None
-    if found is None or not np.linalg.norm(found) > WITHOUT_DIRECTION or not np.all(np.isfinite(found)):
+    if found is None or not np.linalg.norm(found) > VECTOR_LENGTH_MIN or not np.all(np.isfinite(found)):
         return None
     if isinstance(exact, list) and len(exact) == 4:
         better = np.array(exact, dtype=float)
-        found = better if np.max(np.abs(better - found)) <= SINGLE else found
+        found = better if np.max(np.abs(better - found)) <= SINGLE_PRECISION_TOL else found
     return found

@@ -9,23 +9,23 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ....budgets import LARGEST_FILE, MOST_INCLUDES, USD_SECONDS
+from ....budgets import INCLUDED_FILES_MAX, ROBOT_FILE_MAX_BYTES, USD_SECONDS
 from ....errors import BadRequest, MissingExtra
 from ....processes import require_posix
-from ....untrusted import output
+from ....untrusted import run_program
 from ... import xml
 
 PROCESS = Path(__file__).with_name("stage_process.py")
 
 
-def prims(path: Path) -> dict[str, Any]:
+def read_prims(path: Path) -> dict[str, Any]:
     """Return the content of a stage as plain values: ``stage`` and ``prims``. Raises ``BadRobotFile``, and
     ``MissingExtra`` if OpenUSD's package is not installed."""
     found: dict[str, Any] = json.loads(_run(path, "prims", str(path)))
     return found
 
 
-def meshes(asked: Mapping[Path, Sequence[str]]) -> list[list[str]]:
+def read_usd_meshes(asked: Mapping[Path, Sequence[str]]) -> list[list[str]]:
     """Return meshes of stages, by their prims, each as the text of an ``.obj`` file in its own frame and units: all in
     one process."""
     paths = [*asked]
@@ -34,7 +34,7 @@ def meshes(asked: Mapping[Path, Sequence[str]]) -> list[list[str]]:
     return found
 
 
-def binary(text: str, path: Path) -> bytes:
+def convert_to_binary(text: str, path: Path) -> bytes:
     """Return the binary form, for ``path``, of a stage given as text. Raises ``BadRequest`` if there is no room for
     temporary files."""
     _require_package(path)
@@ -57,6 +57,8 @@ def _require_package(path: Path) -> None:
 def _run(path: Path, *arguments: str, given: str = "") -> bytes:
     _require_package(path)
     try:
-        return output(PROCESS, str(LARGEST_FILE), str(MOST_INCLUDES), *arguments, seconds=USD_SECONDS, given=given)
+        return run_program(
+            PROCESS, str(ROBOT_FILE_MAX_BYTES), str(INCLUDED_FILES_MAX), *arguments, seconds=USD_SECONDS, given=given
+        )
     except BadRequest as error:
-        raise xml.refusal(path, str(error)) from None
+        raise xml.make_file_error(path, str(error)) from None

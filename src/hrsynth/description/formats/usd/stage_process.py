@@ -1,4 +1,4 @@
-"""Process run by :func:`untrusted.output`: the content of a USD stage as JSON, meshes of stages, or a binary form.
+"""Process run by :func:`untrusted.run_program`: the content of a USD stage as JSON, meshes of stages, or a binary form.
 Layers are composed only from the stage's own folder."""
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from typing import Any
 
 from hrsynth.untrusted import refuse
 
-LISTED = 64
+USD_ARRAY_ENTRIES_PRINTED_MAX = 64
 """Entries of an array beyond which only their number is returned."""
-MOST_PRIMS = 50_000
+USD_PRIMS_MAX = 50_000
 ENDINGS = (".usd", ".usda", ".usdc")
 
 
@@ -60,7 +60,7 @@ def require_inside(start: Path, largest: int, most: int) -> list[str]:
     return missing
 
 
-def plain(value: Any) -> Any:
+def convert_to_json(value: Any) -> Any:
     """Return a value of USD as one of JSON: quaternions as w x y z, matrices as rows, long arrays as their number."""
     if value is None or isinstance(value, bool | int | float | str):
         return value
@@ -69,14 +69,14 @@ def plain(value: Any) -> Any:
     if hasattr(value, "path") and hasattr(value, "resolvedPath"):
         return value.path
     try:
-        if len(value) > LISTED:
+        if len(value) > USD_ARRAY_ENTRIES_PRINTED_MAX:
             return {"count": len(value)}
-        return [plain(each) for each in value]
+        return [convert_to_json(each) for each in value]
     except TypeError:
         return str(value)
 
 
-def colour_of(prim: Any) -> Any:
+def read_colour(prim: Any) -> Any:
     """Return the colour of a shape, or of the placeholder of a missing mesh: its display colour, else that of its bound
     preview surface."""
     from pxr import UsdGeom, UsdShade
@@ -93,14 +93,14 @@ def colour_of(prim: Any) -> Any:
     return None if found is None else [*map(float, found), 1.0]
 
 
-def told(stage: Any) -> dict[str, Any]:
+def describe_stage(stage: Any) -> dict[str, Any]:
     """Return the stage's units and all relevant prims: shapes, joints, and prims with a schema of UsdPhysics."""
     from pxr import Usd, UsdGeom, UsdPhysics
 
     found, cache = [], UsdGeom.XformCache()
     for number, prim in enumerate(Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies())):
-        if number > MOST_PRIMS:
-            refuse(f"too many prims: expected up to {MOST_PRIMS}")
+        if number > USD_PRIMS_MAX:
+            refuse(f"too many prims: expected up to {USD_PRIMS_MAX}")
         kind, apis = str(prim.GetTypeName()), [str(each) for each in prim.GetAppliedSchemas()]
         relations = {str(each.GetName()): [str(to) for to in each.GetTargets()] for each in prim.GetRelationships()}
         shape, joint = prim.IsA(UsdGeom.Gprim), kind.endswith("Joint") and "physics:body1" in {**relations}
@@ -119,9 +119,9 @@ def told(stage: Any) -> dict[str, Any]:
                 "shape": shape,
                 "joint": joint,
                 "relations": relations,
-                "values": {str(each.GetName()): plain(each.Get()) for each in own},
-                "X": plain(cache.GetLocalToWorldTransform(prim)) if prim.IsA(UsdGeom.Xformable) else None,
-                "colour": colour_of(prim) if shape or prim.HasAttribute("hrsynth:mesh") else None,
+                "values": {str(each.GetName()): convert_to_json(each.Get()) for each in own},
+                "X": convert_to_json(cache.GetLocalToWorldTransform(prim)) if prim.IsA(UsdGeom.Xformable) else None,
+                "colour": read_colour(prim) if shape or prim.HasAttribute("hrsynth:mesh") else None,
                 "guide": shape and UsdGeom.Imageable(prim).ComputePurpose() == "guide",
             }
         )
@@ -136,7 +136,7 @@ def told(stage: Any) -> dict[str, Any]:
     }
 
 
-def obj(stage: Any, path: str) -> str:
+def write_obj(stage: Any, path: str) -> str:
     """Return a mesh as the text of an .obj file."""
     from pxr import UsdGeom
 
@@ -167,11 +167,11 @@ def main(largest: str, most: str, task: str, name: str, *rest: str) -> None:
         for each, prims in json.load(sys.stdin).items() if task == "meshes" else [(name, [])]:
             missing = require_inside(Path(each), int(largest), int(most))
             stage = Usd.Stage.Open(each)
-            texts.append([obj(stage, prim) for prim in prims])
+            texts.append([write_obj(stage, prim) for prim in prims])
         if task == "binary":
             stage.GetRootLayer().Export(rest[0])
         else:
-            json.dump({**told(stage), "missing": missing} if task == "prims" else texts, sys.stdout)
+            json.dump({**describe_stage(stage), "missing": missing} if task == "prims" else texts, sys.stdout)
         sys.stdout.flush()
     except (Tf.ErrorException, RuntimeError, OSError) as error:
         text = " ".join(str(error).split())

@@ -13,16 +13,16 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
-from ....geometry.so3 import quaternions
-from ....geometry.vectors import Array, inverse, perpendicular, pose, unit
+from ....geometry.so3 import convert_to_quaternions
+from ....geometry.vectors import Array, build_pose, find_perpendicular, invert_pose, normalise_vector
 from ....mechanism.model import Joint, JointType, Limits, Mechanism, Note
 from ... import numerals
-from ...annotations import PREFIX, annotations_of
-from ...contents import SIZES, Content, Solid, content_of, principal, unsaid
+from ...annotations import PREFIX, list_annotations
+from ...contents import SIZES, Content, Solid, collect_content, find_principal_axes, list_unsupported_content
 from ...file_format import Written
-from ...jointgraph import comma_list
-from ...meshes import triangles
-from ...tree import outward, spanning
+from ...jointgraph import join_names
+from ...meshes import read_robot_meshes
+from ...tree import build_spanning_mechanism, list_outward_joints
 from .read import FREEDOMS
 
 _TYPES = {
@@ -47,55 +47,55 @@ first)."""
 
 def write(mechanism: Mechanism) -> Written:
     """Return the USD text of a mechanism, and warnings of losses."""
-    robot = spanning(mechanism)
+    robot = build_spanning_mechanism(mechanism)
     return _UsdWriter(robot).write()
 
 
 class _UsdWriter:
     def __init__(self, robot: Mechanism) -> None:
         self.robot = robot
-        self.root = _identifier(robot.name, {})
+        self.root = _make_identifier(robot.name, {})
         taken: dict[str, int] = {"joints": 1}
-        self.names = {link: _identifier(link, taken) for link in robot.links}
+        self.names = {link: _make_identifier(link, taken) for link in robot.links}
         taken = {"to_world": 1}
-        self.joints = {joint: _identifier(joint, taken) for joint in robot.joints}
+        self.joints = {joint: _make_identifier(joint, taken) for joint in robot.joints}
         self.lost: list[Note] = []
 
     def write(self) -> Written:
         robot, body = self.robot, list[str]()
-        says = [f"{key} {text}" for key, text in annotations_of(robot, motors=True)]
+        says = [f"{key} {text}" for key, text in list_annotations(robot, motors=True)]
         body += [
-            f"custom string {PREFIX}:name = {_text(robot.name)}",
-            f"custom string[] {PREFIX}:says = [{', '.join(map(_text, says))}]",
+            f"custom string {PREFIX}:name = {_format_text(robot.name)}",
+            f"custom string[] {PREFIX}:says = [{', '.join(map(_format_text, says))}]",
         ]
         unread: list[str] = []
-        contents = {name: content_of(link, robot) for name, link in robot.links.items()}
-        self.meshes = triangles(
+        contents = {name: collect_content(link, robot) for name, link in robot.links.items()}
+        self.meshes = read_robot_meshes(
             [solid.file for content in contents.values() for solid in content.solids if solid.file is not None],
             robot.file,
         )
         for name, link in robot.links.items():
             body += self._body(name, link.pose, contents[name], unread)
-        order = [*outward(robot), *(joint for joint in robot.joints.values() if not joint.in_tree)]
+        order = [*list_outward_joints(robot), *(joint for joint in robot.joints.values() if not joint.in_tree)]
         weld = [f"rel physics:body1 = </{self.root}/{self.names[robot.base]}>"]
-        joints = _prim("PhysicsFixedJoint", "to_world", weld)
+        joints = _write_prim("PhysicsFixedJoint", "to_world", weld)
         joints += [line for each in order for line in self._joint(each)]
-        body += _prim("Scope", "joints", joints)
+        body += _write_prim("Scope", "joints", joints)
         head = [
             "#usda 1.0",
             "(",
-            f"    defaultPrim = {_text(self.root)}",
+            f"    defaultPrim = {_format_text(self.root)}",
             "    kilogramsPerUnit = 1",
             "    metersPerUnit = 1",
             '    upAxis = "Z"',
             ")",
             "",
         ]
-        text = "\n".join([*head, *_prim("Xform", self.root, body, ["PhysicsArticulationRootAPI"])]) + "\n"
-        self.lost += unsaid(robot, SIZES, dialect="USD")
+        text = "\n".join([*head, *_write_prim("Xform", self.root, body, ["PhysicsArticulationRootAPI"])]) + "\n"
+        self.lost += list_unsupported_content(robot, SIZES, dialect="USD")
         if unread:
             what = "meshes that cannot be read are written by their names alone: "
-            self.lost.append(Note("warning", what + comma_list(unread)))
+            self.lost.append(Note("warning", what + join_names(unread)))
         wide = [
             joint.name
             for joint in robot.joints.values()
@@ -105,7 +105,7 @@ class _UsdWriter:
         ]
         if wide:
             what = "limits of spherical joints are not written: "
-            self.lost.append(Note("warning", what + comma_list(wide)))
+            self.lost.append(Note("warning", what + join_names(wide)))
         return Written((text,), tuple(self.lost))
 
     def _body(self, name: str, X: Array, content: Content, unread: list[str]) -> list[str]:
@@ -114,49 +114,49 @@ class _UsdWriter:
         if inertial is not None and inertial.mass > 0:
             apis.append("PhysicsMassAPI")
             lines += [
-                f"float physics:mass = {_number(inertial.mass)}",
-                f"point3f physics:centerOfMass = {_tuple(inertial.X[:3, 3])}",
+                f"float physics:mass = {_format_number(inertial.mass)}",
+                f"point3f physics:centerOfMass = {_format_tuple(inertial.X[:3, 3])}",
             ]
             if inertial.inertia is not None:
                 R = inertial.X[:3, :3]
                 tensor = inertial.inertia if np.array_equal(R, np.eye(3)) else R @ inertial.inertia @ R.T
-                moments, turn = principal(tensor)
+                moments, turn = find_principal_axes(tensor)
                 lines += [
-                    f"float3 physics:diagonalInertia = {_tuple(moments)}",
-                    f"quatf physics:principalAxes = {_tuple(quaternions(turn))}",
+                    f"float3 physics:diagonalInertia = {_format_tuple(moments)}",
+                    f"quatf physics:principalAxes = {_format_tuple(convert_to_quaternions(turn))}",
                 ]
                 six = (*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2])
-                lines.append(f"custom double[] {PREFIX}:inertia = [{', '.join(map(_number, six))}]")
+                lines.append(f"custom double[] {PREFIX}:inertia = [{', '.join(map(_format_number, six))}]")
         taken: dict[str, int] = {}
         for solid in content.solids:
             lines += self._solid(name, solid, taken, unread)
-        return _prim("Xform", self.names[name], lines, apis)
+        return _write_prim("Xform", self.names[name], lines, apis)
 
     def _solid(self, link: str, solid: Solid, taken: dict[str, int], unread: list[str]) -> list[str]:
         """Return a shape; a mesh with its triangles and, for reading it again, the name of its file."""
-        title = _identifier(solid.name or solid.role, taken)
-        lines = [f"custom string {PREFIX}:name = {_text(solid.name)}"] if solid.name else []
+        title = _make_identifier(solid.name or solid.role, taken)
+        lines = [f"custom string {PREFIX}:name = {_format_text(solid.name)}"] if solid.name else []
         if solid.role == "collision":
             lines.append('uniform token purpose = "guide"')
         elif solid.colour is not None:
             red, green, blue, opacity = solid.colour
-            lines.append(f"color3f[] primvars:displayColor = [{_tuple((red, green, blue))}]")
+            lines.append(f"color3f[] primvars:displayColor = [{_format_tuple((red, green, blue))}]")
             if opacity != 1:
-                lines.append(f"float[] primvars:displayOpacity = [{_number(opacity)}]")
+                lines.append(f"float[] primvars:displayOpacity = [{_format_number(opacity)}]")
         apis = ["PhysicsCollisionAPI"] if solid.role == "collision" else []
         kind, scale = {"box": "Cube"}.get(solid.kind, solid.kind.capitalize()), (1.0, 1.0, 1.0)
         if solid.file is not None:
             found = self.meshes[solid.file]
             lines += [
-                f"custom string {PREFIX}:mesh = {_text(solid.file)}",
-                f"custom double3 {PREFIX}:scale = {_tuple(solid.scale)}",
+                f"custom string {PREFIX}:mesh = {_format_text(solid.file)}",
+                f"custom double3 {PREFIX}:scale = {_format_tuple(solid.scale)}",
             ]
             if found is None:
                 unread.append(f"{link} ({solid.file})")
-                return _prim("Xform", title, [*lines, *_transform_of(solid.X)], apis)
+                return _write_prim("Xform", title, [*lines, *_transform_of(solid.X)], apis)
             points, faces = found
             points = points * solid.scale
-            rows = ", ".join(_tuple(np.round(point, 9) + 0.0) for point in points)
+            rows = ", ".join(_format_tuple(np.round(point, 9) + 0.0) for point in points)
             lines += [
                 f"point3f[] points = [{rows}]",
                 f"int[] faceVertexCounts = [{', '.join(['3'] * len(faces))}]",
@@ -168,28 +168,28 @@ class _UsdWriter:
             scale = solid.sizes[0], solid.sizes[1], solid.sizes[2]
         else:
             lines += [
-                f"double {'height' if key == 'length' else key} = {_number(value)}"
+                f"double {'height' if key == 'length' else key} = {_format_number(value)}"
                 for key, value in zip(SIZES[solid.kind], solid.sizes, strict=True)
             ]
             lines += ['uniform token axis = "Z"'] * (kind != "Sphere")
-        return _prim(kind, title, [*lines, *_transform_of(solid.X, scale)], apis)
+        return _write_prim(kind, title, [*lines, *_transform_of(solid.X, scale)], apis)
 
     def _joint(self, joint: Joint) -> list[str]:
         """Return a joint between two bodies; joints without a type of USD are D6 whose other directions are locked."""
         robot, kind = self.robot, joint.type
-        X_J = pose(joint.point, _frame(joint, robot))
+        X_J = build_pose(joint.point, _build_frame(joint, robot))
         lines = _label(joint.name, self.joints[joint.name])
         if not joint.in_tree or kind is JointType.FREE:
             lines.append("uniform bool physics:excludeFromArticulation = true")
         for side, link in enumerate(joint.links):
-            X = inverse(robot.links[link].pose) @ X_J
-            turn = quaternions(X[:3, :3])
+            X = invert_pose(robot.links[link].pose) @ X_J
+            turn = convert_to_quaternions(X[:3, :3])
             lines += [
                 f"rel physics:body{side} = </{self.root}/{self.names[link]}>",
-                f"point3f physics:localPos{side} = {_tuple(X[:3, 3])}",
-                f"quatf physics:localRot{side} = {_tuple(turn)}",
-                f"custom double3 {PREFIX}:localPos{side} = {_tuple(X[:3, 3])}",
-                f"custom quatd {PREFIX}:localRot{side} = {_tuple(turn)}",
+                f"point3f physics:localPos{side} = {_format_tuple(X[:3, 3])}",
+                f"quatf physics:localRot{side} = {_format_tuple(turn)}",
+                f"custom double3 {PREFIX}:localPos{side} = {_format_tuple(X[:3, 3])}",
+                f"custom quatd {PREFIX}:localRot{side} = {_format_tuple(turn)}",
             ]
         apis: list[str] = []
         free = _FREE[kind]
@@ -200,11 +200,11 @@ class _UsdWriter:
                 apis.append(f"PhysicsLimitAPI:{each}")
                 lines += [f"float limit:{each}:physics:low = 1", f"float limit:{each}:physics:high = -1"]
         if joint.limits is not None:
-            lines += _limits(kind, joint.limits, free, apis)
+            lines += _write_limits(kind, joint.limits, free, apis)
         if joint.motor is not None and free:
             lines += _drive(kind, joint.limits, free, apis)
         lines += self._mimic(joint, free, apis)
-        return _prim(_TYPES.get(kind, "PhysicsJoint"), self.joints[joint.name], lines, apis)
+        return _write_prim(_TYPES.get(kind, "PhysicsJoint"), self.joints[joint.name], lines, apis)
 
     def _mimic(self, joint: Joint, free: tuple[str, ...], apis: list[str]) -> Iterator[str]:
         """Return a coupling in PhysX's form: q + gearing × q of the reference = 0."""
@@ -219,28 +219,28 @@ class _UsdWriter:
                 continue
             stem = f"physxMimicJoint:{free[0]}:"
             apis.append(f"PhysxMimicJointAPI:{free[0]}")
-            yield f"float {stem}gearing = {_number(-gear.ratio)}"
+            yield f"float {stem}gearing = {_format_number(-gear.ratio)}"
             yield f"float {stem}offset = 0"
             yield f"rel {stem}referenceJoint = </{self.root}/joints/{self.joints[other.name]}>"
-            yield f"custom double {PREFIX}:ratio = {_number(gear.ratio)}"
-            yield f"custom string {PREFIX}:coupling = {_text(gear.name)}"
+            yield f"custom double {PREFIX}:ratio = {_format_number(gear.ratio)}"
+            yield f"custom string {PREFIX}:coupling = {_format_text(gear.name)}"
 
 
-def _frame(joint: Joint, robot: Mechanism) -> Array:
+def _build_frame(joint: Joint, robot: Mechanism) -> Array:
     """Return a rotation (3, 3) with x along the axis; of a universal joint x along the second axis, y along the
     first."""
     if not joint.axes:
         return robot.links[joint.successor].pose[:3, :3]
     x = joint.axes[-1]
-    y = perpendicular(x, joint.axes[0] if joint.type is JointType.UNIVERSAL else None)
-    return np.column_stack((x, y, unit(np.cross(x, y))))
+    y = find_perpendicular(x, joint.axes[0] if joint.type is JointType.UNIVERSAL else None)
+    return np.column_stack((x, y, normalise_vector(np.cross(x, y))))
 
 
-def _limits(kind: JointType, limits: Limits, free: tuple[str, ...], apis: list[str]) -> Iterator[str]:
+def _write_limits(kind: JointType, limits: Limits, free: tuple[str, ...], apis: list[str]) -> Iterator[str]:
     for key in ("lower", "upper", "velocity", "effort"):
         value = getattr(limits, key)
         if value is not None and not (kind is JointType.SPHERICAL and key in ("lower", "upper")):
-            yield f"custom double {PREFIX}:{key} = {_number(value)}"
+            yield f"custom double {PREFIX}:{key} = {_format_number(value)}"
     pairs: Mapping[str, str] = {"lower": "physics:lowerLimit", "upper": "physics:upperLimit"}
     if kind is JointType.SPHERICAL or (limits.lower, limits.upper) == (None, None):
         return
@@ -252,7 +252,7 @@ def _limits(kind: JointType, limits: Limits, free: tuple[str, ...], apis: list[s
         for key, name in pairs.items():
             value = getattr(limits, key)
             if value is not None:
-                yield f"float {name} = {_number(value * factor)}"
+                yield f"float {name} = {_format_number(value * factor)}"
 
 
 def _drive(kind: JointType, limits: Limits | None, free: tuple[str, ...], apis: list[str]) -> Iterator[str]:
@@ -262,16 +262,16 @@ def _drive(kind: JointType, limits: Limits | None, free: tuple[str, ...], apis: 
         apis.append(f"PhysicsDriveAPI:{word}")
         yield f'uniform token drive:{word}:physics:type = "force"'
         if limits is not None and limits.effort is not None:
-            yield f"float drive:{word}:physics:maxForce = {_number(limits.effort)}"
+            yield f"float drive:{word}:physics:maxForce = {_format_number(limits.effort)}"
 
 
-def _prim(kind: str, name: str, lines: Iterable[str], apis: Iterable[str] = ()) -> list[str]:
+def _write_prim(kind: str, name: str, lines: Iterable[str], apis: Iterable[str] = ()) -> list[str]:
     """Return a prim: its schemas, and its content, indented."""
-    schemas = ", ".join(map(_text, apis))
+    schemas = ", ".join(map(_format_text, apis))
     head = (
-        [f"def {kind} {_text(name)} (", f"    prepend apiSchemas = [{schemas}]", ")"]
+        [f"def {kind} {_format_text(name)} (", f"    prepend apiSchemas = [{schemas}]", ")"]
         if schemas
-        else [f"def {kind} {_text(name)}"]
+        else [f"def {kind} {_format_text(name)}"]
     )
     return [*head, "{", *(f"    {line}" for line in lines), "}"]
 
@@ -280,23 +280,23 @@ def _transform_of(X: Array, scale: tuple[float, ...] = (1.0, 1.0, 1.0)) -> list[
     """Return the transform of a prim in its parent's frame."""
     found, order = [], []
     if np.any(X[:3, 3]):
-        found.append(f"double3 xformOp:translate = {_tuple(X[:3, 3])}")
+        found.append(f"double3 xformOp:translate = {_format_tuple(X[:3, 3])}")
         order.append("xformOp:translate")
     if not np.array_equal(X[:3, :3], np.eye(3)):
-        found.append(f"quatd xformOp:orient = {_tuple(quaternions(X[:3, :3]))}")
+        found.append(f"quatd xformOp:orient = {_format_tuple(convert_to_quaternions(X[:3, :3]))}")
         order.append("xformOp:orient")
     if scale != (1.0, 1.0, 1.0):
-        found.append(f"double3 xformOp:scale = {_tuple(scale)}")
+        found.append(f"double3 xformOp:scale = {_format_tuple(scale)}")
         order.append("xformOp:scale")
-    return [*found, f"uniform token[] xformOpOrder = [{', '.join(map(_text, order))}]"] if order else []
+    return [*found, f"uniform token[] xformOpOrder = [{', '.join(map(_format_text, order))}]"] if order else []
 
 
 def _label(name: str, identifier: str) -> list[str]:
     """Return the name if USD's identifiers cannot hold it."""
-    return [] if name == identifier else [f"custom string {PREFIX}:name = {_text(name)}"]
+    return [] if name == identifier else [f"custom string {PREFIX}:name = {_format_text(name)}"]
 
 
-def _identifier(name: str, taken: dict[str, int]) -> str:
+def _make_identifier(name: str, taken: dict[str, int]) -> str:
     """Return a name of letters, digits and underscores that no sibling has."""
     plain = re.sub(r"\W", "_", name, flags=re.ASCII) or "_"
     plain = plain if not plain[0].isdigit() else f"_{plain}"
@@ -307,14 +307,14 @@ def _identifier(name: str, taken: dict[str, int]) -> str:
     return found
 
 
-def _text(value: str) -> str:
+def _format_text(value: str) -> str:
     """Return a text in quotes."""
     return json.dumps(value, ensure_ascii=False)
 
 
-def _number(value: float) -> str:
-    return numerals.exact(value)
+def _format_number(value: float) -> str:
+    return numerals.format_exact(value)
 
 
-def _tuple(values: Iterable[float]) -> str:
-    return f"({', '.join(_number(float(value)) for value in values)})"
+def _format_tuple(values: Iterable[float]) -> str:
+    return f"({', '.join(_format_number(float(value)) for value in values)})"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from ....analysis.aspects.aspects import AspectTable, aspects
-from ...text.poses import aspect_groups, pair_words
-from ..commands import lines_at
+from ...text.poses import format_aspect_groups, pair_words
+from ..commands import format_commands_at
 from ..request import Request
 
 
@@ -23,16 +23,16 @@ def answer(request: Request) -> dict[str, Any]:
             next((i for i, group in enumerate(found.groups, 1) if known and number in group), None)
             for number in range(1, len(found.places) + 1)
         ],
-        "words": words(found),
+        "words": describe_aspects(found),
         "pairs": [
             f"modes {one} and {other}: {pair_words(pair)}" for pair in found.pairs for one, other in [pair.numbers]
         ],
-        **lines_at(request, "aspects", setup, here.real),
+        **format_commands_at(request, "aspects", setup, here.real),
     }
 
 
-def words(found: AspectTable) -> str:
+def describe_aspects(found: AspectTable) -> str:
     """Describe the aspects of the modes."""
     if not found.groups:
         return "no aspect: the robot was not found assembled at any mode"
-    return f"aspects of the hidden robot: {found.aspects_met} ({aspect_groups(found)})"
+    return f"aspects of the hidden robot: {found.aspects_met} ({format_aspect_groups(found)})"

@@ -14,7 +14,7 @@ from ....errors import BadRequest
 from ...outputs import OUTPUTS
 from ...show import draw
 from ...view.view import view
-from ..commands import lines
+from ..commands import format_commands
 from ..request import Request
 
 NATIVE = "native"
@@ -31,23 +31,23 @@ def answer(request: Request) -> dict[str, Any]:
     return {"name": f"{name}{ending}", "type": type_, "base64": base64.b64encode(content).decode(), **same}
 
 
-def _page(request: Request) -> tuple[str, bytes, dict[str, str]]:
+def _export_page(request: Request) -> tuple[str, bytes, dict[str, str]]:
     found = view(request.seeing(), hidden=True)
     (each,) = OUTPUTS["view"].files
     name = found.setup.robot.name
-    same = lines(request, "view", "--static", f"{name}.html", hidden=True)
-    return name, _bytes(each.content(found, ".html", {})[0]), same
+    same = format_commands(request, "view", "--static", f"{name}.html", hidden=True)
+    return name, _join_bytes(each.content(found, ".html", {})[0]), same
 
 
 def _report(request: Request) -> tuple[str, bytes, dict[str, str]]:
     name = f"{request.derivation.robot.name}_report"  # the page has the bare name
     report = next(each for each in OUTPUTS["derive"].files if each.option == "report")
     content = report.content(request.derivation, ".html", {"seed": 0})[0]
-    return name, _bytes(content), lines(request, "derive", "--report", f"{name}.html")
+    return name, _join_bytes(content), format_commands(request, "derive", "--report", f"{name}.html")
 
 
-def _figure(request: Request) -> tuple[str, bytes, dict[str, str]]:
-    same = lines(request, "derive")
+def _export_figure(request: Request) -> tuple[str, bytes, dict[str, str]]:
+    same = format_commands(request, "derive")
     return (
         request.derivation.robot.name,
         draw(request.derivation).content,
@@ -55,26 +55,26 @@ def _figure(request: Request) -> tuple[str, bytes, dict[str, str]]:
     )
 
 
-def _robot(request: Request) -> tuple[str, bytes, dict[str, str]]:
+def _export_robot(request: Request) -> tuple[str, bytes, dict[str, str]]:
     mechanism = request.mechanism
-    dialect = next(each for each in formats.writable() if each.name == NATIVE)
+    dialect = next(each for each in formats.list_writable_formats() if each.name == NATIVE)
     name = re.sub(r"[^\w.-]", "_", mechanism.name)
     target = Path(mechanism.file or name).with_name(f"{name}.urdf")
     robot, _, _ = carry_meshes(mechanism, target, dialect.meshes, copy=False)
-    (text,) = formats.writer(NATIVE)(robot).texts
-    same = lines(request, "import", "--yes", "-o", target.name, watching=False)
-    loaded = lines(request, "load", watching=False)["python"]
+    (text,) = formats.get_writer(NATIVE)(robot).texts
+    same = format_commands(request, "import", "--yes", "-o", target.name, watching=False)
+    loaded = format_commands(request, "load", watching=False)["python"]
     return name, dialect.packed(text, target), {**same, "python": f"hrsynth.save({loaded}, {target.name!r})"}
 
 
-def _bytes(content: Any) -> bytes:
+def _join_bytes(content: Any) -> bytes:
     return content if isinstance(content, bytes) else b"".join(content)
 
 
 KINDS: dict[str, tuple[str, str, Callable[[Request], tuple[str, bytes, dict[str, str]]]]] = {
-    "page": (".html", "text/html", _page),
+    "page": (".html", "text/html", _export_page),
     "report": (".html", "text/html", _report),
-    "figure": (".svg", "image/svg+xml", _figure),
-    "robot": (".urdf", "application/xml", _robot),
+    "figure": (".svg", "image/svg+xml", _export_figure),
+    "robot": (".urdf", "application/xml", _export_robot),
 }
 """Suffix, media type and maker of each kind."""

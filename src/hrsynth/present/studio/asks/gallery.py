@@ -12,9 +12,9 @@ from ....families.table import ROBOTS
 from ....geometry.vectors import Array, orient_axis
 from ....mechanism import JointType, Mechanism
 from ....mechanism.legs import decompose
-from ....mechanism.normal import normal_form
+from ....mechanism.normal import reduce_to_normal_form
 from ....mechanism.notation import parse
-from ....tolerances import SAME_DIRECTION
+from ....tolerances import DIRECTION_SINE_TOL
 from ...portrait import Portrait
 from ..request import SHIPPED, Request
 
@@ -26,11 +26,11 @@ WIDTH, HEIGHT = 180, 130
 
 def answer(request: Request) -> dict[str, Any]:
     """Return all robots that can be opened by a click."""
-    return {"robots": robots(), "files": [] if request.folder is None else files(request)}
+    return {"robots": list_gallery(), "files": [] if request.folder is None else list_robot_files(request)}
 
 
 @cache
-def robots() -> list[dict[str, Any]]:
+def list_gallery() -> list[dict[str, Any]]:
     """Return the shipped robots, sorted."""
     known = {each.name: each for each in ROBOTS}
     return [
@@ -39,30 +39,32 @@ def robots() -> list[dict[str, Any]]:
             "name": name,
             "title": name.replace("_", " "),
             "words": f"{parse(known[name].architecture)}, {known[name].dof} dof",
-            "picture": picture(load(name)),
+            "picture": draw_thumbnail(load(name)),
         }
         for name in list_robots()
     ]
 
 
-def picture(robot: Mechanism) -> str:
+def draw_thumbnail(robot: Mechanism) -> str:
     """Draw a robot, small."""
-    decomposition = decompose(normal_form(robot).mechanism)
-    portrait = Portrait.draw(decomposition.mechanism, decomposition.platform, (), flat(decomposition.mechanism))
+    decomposition = decompose(reduce_to_normal_form(robot).mechanism)
+    portrait = Portrait.draw(
+        decomposition.mechanism, decomposition.platform, (), find_confining_plane(decomposition.mechanism)
+    )
     return portrait.svg(WIDTH, HEIGHT, robot.name)
 
 
-def flat(robot: Mechanism) -> Array | None:
+def find_confining_plane(robot: Mechanism) -> Array | None:
     """Return the normal of the plane to which the joints of a robot confine it, None if they do not."""
     turns = [joint.axis for joint in robot.joints.values() if joint.type is JointType.REVOLUTE]
     slides = [joint.axis for joint in robot.joints.values() if joint.type is JointType.PRISMATIC]
     if not turns or len(turns) + len(slides) < len(robot.joints):
         return None
     away = max([np.linalg.norm(np.cross(turns[0], axis)) for axis in turns] + [abs(turns[0] @ axis) for axis in slides])
-    return orient_axis(turns[0]) if away < SAME_DIRECTION else None
+    return orient_axis(turns[0]) if away < DIRECTION_SINE_TOL else None
 
 
-def files(request: Request) -> list[str]:
+def list_robot_files(request: Request) -> list[str]:
     """List the robot files of the folder, by name; links that lead out of it are ignored."""
     assert request.folder is not None
     try:

@@ -6,33 +6,33 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from ....analysis.observed import ObservedRobot
-from ....description import file_of
+from ....description import find_robot_file
 from ....description.assembly.choices import ImportChoices, choices
 from ....description.overrides import UNITS, Overrides
 from ....errors import HrsynthError, NoSegment
 from ....mechanism.legs import Leg
-from ....mechanism.sensors import default_observation, reason
-from ...view.meshes import meshes
-from ...view.scale import scale, unit_of
-from ...view.shapes import PAGE_DIGITS
-from ...view.states import REAL, Mover, Posed
-from ...view.view import arrows_of, machine_of, stage
-from ..commands import lines
+from ....mechanism.sensors import choose_default_segment, explain_default
+from ...view.meshes import collect_meshes
+from ...view.scale import choose_error_unit, scale
+from ...view.shapes import PAGE_DIGITS_COUNT
+from ...view.states import REAL, Mover, RealAndHiddenState
+from ...view.view import build_machine, describe_stage, list_arrows
+from ..commands import format_commands
 from ..request import Request
 from .move import describe_pose
 
-MOST_OFFERED = 30
+ASSUMPTION_CANDIDATES_MAX = 30
 """Largest number of alternatives to an assumption that are offered."""
 
 
 def answer(request: Request) -> dict[str, Any]:
     """Return the scene of a robot. If its file can be read but makes no robot: the reason (``failed``) and the
     assumptions."""
-    found = guess_choices(request)
-    guesses = [] if found is None else list(offers(request, found))
+    found = list_assumptions(request)
+    guesses = [] if found is None else list(list_alternatives(request, found))
     dialect = "hrsynth" if found is None else found.dialect
     try:
-        return {**scene(request), "guesses": guesses, "dialect": dialect, "failed": None}
+        return {**describe_opened(request), "guesses": guesses, "dialect": dialect, "failed": None}
     except HrsynthError as error:
         if not guesses:
             raise
@@ -44,32 +44,32 @@ def answer(request: Request) -> dict[str, Any]:
             "guesses": guesses,
             "dialect": dialect,
             "notes": [str(note) for note in found.notes] if found else [],
-            **lines(request, "derive"),
+            **format_commands(request, "derive"),
         }
 
 
-def scene(request: Request) -> dict[str, Any]:
+def describe_opened(request: Request) -> dict[str, Any]:
     """Return what is drawn and moved."""
     setup, mover = request.setup, request.mover()
     known = {each.leg: each for each in (*setup.segments, *setup.observed)}
-    shapes, missing = meshes(setup, request.fence)
+    shapes, missing = collect_meshes(setup, request.fence)
     places = [mover.places(each)[REAL] for each in (mover.home, *(end for pair in request.ends for end in pair))]
     words = str(setup.decomposition.architecture())
-    machine = machine_of(REAL, setup, setup.mechanism, words, places, shapes)
+    machine = build_machine(REAL, setup, setup.mechanism, words, places, shapes)
     here = request.here(mover)
     return {
-        **stage(setup, [machine], arrows_of(setup, known.values())),
+        **describe_stage(setup, [machine], list_arrows(setup, known.values())),
         "words": f"{words}, {setup.dof} dof",
-        "legs": [_leg(request, setup, leg) for leg in setup.decomposition.legs],
-        "sliders": sliders(mover, request.ends),
-        "scale": scale(unit_of(setup)),
+        "legs": [_describe_leg(request, setup, leg) for leg in setup.decomposition.legs],
+        "sliders": make_sliders(mover, request.ends),
+        "scale": scale(choose_error_unit(setup)),
         **describe_pose(request, mover, here),
         "notes": [*map(str, setup.robot.notes), *setup.beside(), *missing],
-        **lines(request, "derive"),
+        **format_commands(request, "derive"),
     }
 
 
-def sliders(mover: Mover, ends: Sequence[tuple[Posed, Posed]]) -> list[dict[str, Any]]:
+def make_sliders(mover: Mover, ends: Sequence[tuple[RealAndHiddenState, RealAndHiddenState]]) -> list[dict[str, Any]]:
     """Return a slider for each platform coordinate, over its range from the zero configuration."""
     made = []
     coordinates = mover.coordinates
@@ -82,38 +82,38 @@ def sliders(mover: Mover, ends: Sequence[tuple[Posed, Posed]]) -> list[dict[str,
                 "name": name,
                 "label": name,
                 "unit": "rad" if place >= 3 else "m",
-                "min": round(low, PAGE_DIGITS),
-                "max": round(high, PAGE_DIGITS),
+                "min": round(low, PAGE_DIGITS_COUNT),
+                "max": round(high, PAGE_DIGITS_COUNT),
                 "home": home,
             }
         )
     return made
 
 
-def _leg(request: Request, setup: ObservedRobot, leg: Leg) -> dict[str, Any]:
+def _describe_leg(request: Request, setup: ObservedRobot, leg: Leg) -> dict[str, Any]:
     """Return a leg: its chain, whether it can be observed, the reason, and its name in requests (``ask``)."""
     seen = next((each for each in setup.observed if each.leg == leg.label), None)
     default = next((each for each in setup.segments if each.leg == leg.label), None)
     shown, why = seen or default, None
     if shown is None:
         try:
-            shown = default_observation(setup.decomposition, leg)
+            shown = choose_default_segment(setup.decomposition, leg)
         except NoSegment as error:
             why = str(error)
     if shown is not None:
-        why = reason(setup.decomposition, shown)
+        why = explain_default(setup.decomposition, shown)
     return {
         "name": leg.label,
         "words": str(setup.decomposition.word(leg)),
         "can": shown is not None,
         "why": why,
-        "watched": seen is not None and not request.blind,
+        "watched": seen is not None and not request.has_no_observation,
         "link": None if shown is None else shown.link,
         "ask": seen.link if seen and not (default and seen.link == default.link) else leg.label,
     }
 
 
-def guess_choices(request: Request) -> ImportChoices | None:
+def list_assumptions(request: Request) -> ImportChoices | None:
     """Return the assumptions of reading a file, None if there are none or it cannot be read."""
     said = dict(request.source.options)
     try:
@@ -124,18 +124,18 @@ def guess_choices(request: Request) -> ImportChoices | None:
             freeze=said.get("freeze", ()),
             unit=said.get("unit"),
         )
-        return choices(file_of(request.source.robot), given)
+        return choices(find_robot_file(request.source.robot), given)
     except HrsynthError:
         return None
 
 
-def offers(request: Request, found: ImportChoices) -> Iterator[dict[str, Any]]:
+def list_alternatives(request: Request, found: ImportChoices) -> Iterator[dict[str, Any]]:
     """Yield each assumption by the name of the option that overrides it, with the alternatives."""
     said = dict(request.source.options)
 
     def offer(name: str, now: Any, why: str, candidates: list[Any]) -> dict[str, Any]:
         offered = [now, *(each for each in candidates if each != now)]
-        return {"name": name, "found": now, "why": why, "candidates": offered[:MOST_OFFERED]}
+        return {"name": name, "found": now, "why": why, "candidates": offered[:ASSUMPTION_CANDIDATES_MAX]}
 
     if found.platforms:
         told = "chosen" if "platform" in said else found.why if found.told else "several are possible"

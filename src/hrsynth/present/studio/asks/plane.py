@@ -9,33 +9,33 @@ from typing import Any
 
 import numpy as np
 
-from ....analysis.accuracy.accuracy import sees_all
+from ....analysis.accuracy.accuracy import require_full_observation
 from ....analysis.accuracy.error_map import Mapper
 from ....analysis.accuracy.measurement_bounds import MeasurementBounds
-from ....analysis.accuracy.pose_errors import largest_by_ascent
-from ....analysis.singularity.condition_check import weakest
+from ....analysis.accuracy.pose_errors import search_largest_errors
+from ....analysis.singularity.condition_check import compute_smallest_value
 from ....batch.pose_continuation import spread
-from ....budgets import FARTHEST_POSE, LARGEST_STUDIO_PLANE, LARGEST_STUDIO_SWEEP
+from ....budgets import POSE_VALUE_MAX, STUDIO_PLANE_SIDE_MAX, STUDIO_SWEEP_SIDE_MAX
 from ....errors import BadRequest
-from ....geometry.vectors import Array, nested_lists
+from ....geometry.vectors import Array, convert_to_lists
 from ....kinematics.configuration import ClosedConfiguration
 from ....kinematics.continuation import track
 from ....kinematics.coordinates import Coordinates
 from ....mechanism.pose import SCALARS, Grid, Pose
 from ....results import Value
-from ....tolerances import ON_LOCUS, SAME_RELATION, SLIDER_ARRIVED
-from ...text.tables import NOT_BOUNDED, is_bounded
-from ...view.scale import CONE, CONE_TEXT, SIGNS, STEPS, round_digits, unit_of
+from ....tolerances import LOCUS_SINGULAR_VALUE_FRACTION, RELATION_ANGLE_TOL, SLIDER_TARGET_TOL
+from ...text.tables import NOT_BOUNDED, check_bounded
+from ...view.scale import CONE, CONE_TEXT, SIGNS, STEPS, choose_error_unit, round_digits
 from ...view.states import Mover
-from ..commands import NONE, digits, lines, same_at
+from ..commands import NONE, format_commands, format_digits, is_reproduced_by_pose
 from ..request import Request
 
 ACCURACY, DISTANCE = "accuracy", "distance"
 DISTANCES = (0.01, 0.03, 0.1, 0.3)
 """Steps of the singularity distance (the smallest singular value of Mᵀ, characteristic lengths)."""
-CHECKED = 2
+PLANE_CHECKED_POSES_COUNT = 2
 """Poses at which the batch is compared with Pinocchio; few, as a dragged plane is computed often."""
-SIZE = 24
+PLANE_SIDE_VALUES_COUNT = 24
 """Values per side, by default."""
 
 
@@ -51,50 +51,51 @@ class PoseField(Value):
 def answer(request: Request) -> dict[str, Any]:
     """Return a plane of two coordinates, the others as at ``here``, the third at ``at``."""
     setup, mover = request.seeing(), request.mover()
-    sees_all(setup)
+    require_full_observation(setup)
     here = request.here(mover)
     kind = request.text("kind", (ACCURACY, DISTANCE)) or ACCURACY
     pair = _pair(mover, request.text("of"))
-    size = request.count("size", 2, LARGEST_STUDIO_PLANE) or SIZE
+    size = request.count("size", 2, STUDIO_PLANE_SIDE_MAX) or PLANE_SIDE_VALUES_COUNT
     values = mover.read(here)
     third = [i for i in range(len(values)) if i not in pair]
-    ranges = [_range(request, mover, i) for i in pair]
-    at = request.number("at", -FARTHEST_POSE, FARTHEST_POSE)
+    ranges = [_read_slider_range(request, mover, i) for i in pair]
+    at = request.number("at", -POSE_VALUE_MAX, POSE_VALUE_MAX)
     if at is not None and third:
-        low, high = _range(request, mover, third[0])
-        if not low - SLIDER_ARRIVED <= at <= high + SLIDER_ARRIVED:
+        low, high = _read_slider_range(request, mover, third[0])
+        if not low - SLIDER_TARGET_TOL <= at <= high + SLIDER_TARGET_TOL:
             raise BadRequest("at", at, f"{low:.6g} to {high:.6g}")
         values[third[0]] = at
-    mapper, unit = Mapper(setup, MeasurementBounds(np.full(len(setup.observed), CONE))), unit_of(setup)
-    known = mapper.batch is not None and _at_batch(mover, here.real)
-    cells = size if known else min(size, LARGEST_STUDIO_SWEEP)
-    grid = together(mover, here.real, pair, values, ranges, cells)
+    mapper, unit = Mapper(setup, MeasurementBounds(np.full(len(setup.observed), CONE))), choose_error_unit(setup)
+    known = mapper.batch is not None and _is_closed_form_solution(mover, here.real)
+    cells = size if known else min(size, STUDIO_SWEEP_SIDE_MAX)
+    grid = build_plane_grid(mover, here.real, pair, values, ranges, cells)
     if grid is not None and known:
-        found = by_batch(mapper, grid, kind, unit)
+        found = map_by_batch(mapper, grid, kind, unit)
     else:
-        found = one_by_one(mover, here.real, pair, values, ranges, cells, kind, unit)
+        found = map_one_by_one(mover, here.real, pair, values, ranges, cells, kind, unit)
     same = NONE
-    if grid is not None and (known or same_at(setup, here.real)):
-        text = grid_text(grid)
+    if grid is not None and (known or is_reproduced_by_pose(setup, here.real)):
+        text = format_grid(grid)
         same = (
-            lines(request, "accuracy", cone=CONE_TEXT, grid=text)
+            format_commands(request, "accuracy", cone=CONE_TEXT, grid=text)
             if kind == ACCURACY
-            else lines(request, "check", grid=text)
+            else format_commands(request, "check", grid=text)
         )
-    place = _placer(mover, pair, values)
+    place = _make_placer(mover, pair, values)
     (a, b), (c, d) = (map(float, ends) for ends in ranges)
     across = mover.coordinates.places[third[0]] if third else None
     return {
         "corners": [place(x, y).tolist() for x, y in ((a, c), (b, c), (b, d), (a, d))],
         "n": cells,
-        "values": nested_lists(found.values.T),
+        "values": convert_to_lists(found.values.T),
         "unit": unit if kind == ACCURACY else "",
         "steps": list(STEPS[unit] if kind == ACCURACY else DISTANCES),
         "falling": kind == DISTANCE,
         "at": float(values[third[0]]) if third else None,
         "normal": np.eye(3)[across].tolist() if across is not None and across < 3 else None,
         "locus": [[place(*point).tolist() for point in segment] for segment in found.locus],
-        "words": _words(kind, unit, found, here.real.model.length) + ("" if grid is not None and known else SINGLY),
+        "words": _describe_plane(kind, unit, found, here.real.model.length)
+        + ("" if grid is not None and known else SINGLY),
         "of": [mover.coordinates.names[i] for i in pair],
         **same,
     }
@@ -103,7 +104,7 @@ def answer(request: Request) -> dict[str, Any]:
 SINGLY = " The poses were computed one by one: the Type 2 locus between them is not drawn."
 
 
-def _range(request: Request, mover: Mover, index: int) -> Array:
+def _read_slider_range(request: Request, mover: Mover, index: int) -> Array:
     """Return the least and the largest value of a coordinate's slider, (2,)."""
     return np.sort([mover.read(end)[index] for end in request.ends[index]])
 
@@ -119,16 +120,16 @@ def _pair(mover: Mover, said: str | None) -> tuple[int, int]:
     return found[0][0], found[0][1]
 
 
-def _at_batch(mover: Mover, at: ClosedConfiguration) -> bool:
+def _is_closed_form_solution(mover: Mover, at: ClosedConfiguration) -> bool:
     """Return True if a configuration is that of the closed forms at its pose."""
     placer = mover.setup.placer
     if placer is None:
         return False
     (found,) = placer.configurations(at.pose(mover.setup.motion.link)[None])
-    return found is not None and float(np.linalg.norm(at.model.difference(found.q, at.q))) < SAME_RELATION
+    return found is not None and float(np.linalg.norm(at.model.difference(found.q, at.q))) < RELATION_ANGLE_TOL
 
 
-def together(
+def build_plane_grid(
     mover: Mover, here: ClosedConfiguration, pair: tuple[int, int], values: Array, ranges: list[Array], size: int
 ) -> Grid | None:
     """Return the plane as a grid of poses, None if coordinates of a pose cannot express it."""
@@ -150,29 +151,35 @@ def together(
     return Grid(axes, Pose(**parts))
 
 
-def grid_text(grid: Grid) -> str:
+def format_grid(grid: Grid) -> str:
     """Format the grid as an option."""
-    held = [f"{name}={'/'.join(map(digits, values))}" for name, values in grid.fixed.given.items()]
+    held = [f"{name}={'/'.join(map(format_digits, values))}" for name, values in grid.fixed.given.items()]
     return ",".join(
-        [*(f"{name}={digits(values[0])}:{digits(values[-1])}:{len(values)}" for name, values in grid.axes), *held]
+        [
+            *(
+                f"{name}={format_digits(values[0])}:{format_digits(values[-1])}:{len(values)}"
+                for name, values in grid.axes
+            ),
+            *held,
+        ]
     )
 
 
-def by_batch(mapper: Mapper, grid: Grid, kind: str, unit: str) -> PoseField:
+def map_by_batch(mapper: Mapper, grid: Grid, kind: str, unit: str) -> PoseField:
     """Evaluate the plane by closed forms, compared with Pinocchio at some poses."""
-    found = mapper.over(grid, 0, CHECKED)
-    table = found.smallest if kind == DISTANCE else _in_unit(found.position, found.orientation, unit)
+    found = mapper.over(grid, 0, PLANE_CHECKED_POSES_COUNT)
+    table = found.smallest if kind == DISTANCE else _convert_errors(found.position, found.orientation, unit)
     signs, (x, y) = found.determinant, (values for _, values in grid.axes)
     if signs is None or found.smallest_at is None:
         return PoseField(table, np.zeros((0, 2, 2)))
-    segments = np.array([*_crossings(x, y, signs)]).reshape(-1, 2, 2)
+    segments = np.array([*_find_zero_segments(x, y, signs)]).reshape(-1, 2, 2)
     # a determinant changes its sign as well where it is infinite (Type 1): there Mᵀ does not lose its rank
     least = found.smallest_at(segments.mean(axis=1)) if len(segments) else np.zeros(0)
     usual = float(np.nanmedian(found.smallest))
-    return PoseField(table, segments[least < ON_LOCUS * usual])
+    return PoseField(table, segments[least < LOCUS_SINGULAR_VALUE_FRACTION * usual])
 
 
-def one_by_one(
+def map_one_by_one(
     mover: Mover,
     here: ClosedConfiguration,
     pair: tuple[int, int],
@@ -199,18 +206,22 @@ def one_by_one(
     found = np.full((2, len(aims)), np.nan)
     for i, at in enumerate(spread(here, (size, size), aims, lead)):
         if at is not None:
-            found[:, i] = (weakest(at, question), np.nan) if kind == DISTANCE else largest_by_ascent(at, question, blur)
-    table = found[0] if kind == DISTANCE else _in_unit(found[0], found[1], unit)
+            found[:, i] = (
+                (compute_smallest_value(at, question), np.nan)
+                if kind == DISTANCE
+                else search_largest_errors(at, question, blur)
+            )
+    table = found[0] if kind == DISTANCE else _convert_errors(found[0], found[1], unit)
     return PoseField(table.reshape(size, size), np.zeros((0, 2, 2)))
 
 
-def _in_unit(position: Array, orientation: Array, unit: str) -> Array:
+def _convert_errors(position: Array, orientation: Array, unit: str) -> Array:
     """Return errors in the unit in which they are shown; unbounded ones exceed any step."""
     found = 1e3 * position if unit == "mm" else np.degrees(orientation)
-    return np.where(np.isinf(position) | np.isinf(orientation), FARTHEST_POSE, found)
+    return np.where(np.isinf(position) | np.isinf(orientation), POSE_VALUE_MAX, found)
 
 
-def _crossings(x: Array, y: Array, values: Array) -> Iterator[Array]:
+def _find_zero_segments(x: Array, y: Array, values: Array) -> Iterator[Array]:
     """Yield segments (2, 2) on which values (nx, ny) vanish, between the sides of each cell that they cross."""
     for i, j in np.argwhere(np.isfinite(values[:-1, :-1] + values[1:, :-1] + values[:-1, 1:] + values[1:, 1:])):
         corners = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1), (i, j)]
@@ -223,7 +234,7 @@ def _crossings(x: Array, y: Array, values: Array) -> Iterator[Array]:
             yield np.array(met[k : k + 2])
 
 
-def _placer(mover: Mover, pair: tuple[int, int], values: Array) -> Callable[[float, float], Array]:
+def _make_placer(mover: Mover, pair: tuple[int, int], values: Array) -> Callable[[float, float], Array]:
     """Return the function that draws points of the plane; a rotation is a distance along its axis, one radian the
     characteristic length."""
     motion, length = mover.setup.motion, mover.home.real.model.length
@@ -245,7 +256,7 @@ def _placer(mover: Mover, pair: tuple[int, int], values: Array) -> Callable[[flo
     return place
 
 
-def _words(kind: str, unit: str, found: PoseField, length: float) -> str:
+def _describe_plane(kind: str, unit: str, found: PoseField, length: float) -> str:
     """Describe the number of reached poses and the range of the values."""
     here = found.values[np.isfinite(found.values)]
     if not here.size:
@@ -254,6 +265,6 @@ def _words(kind: str, unit: str, found: PoseField, length: float) -> str:
     if kind == DISTANCE:
         return f"{part}; the smallest singular value of Mᵀ lies between {here.min():.2g} and {here.max():.2g}."
     most = float(here.max())
-    near = is_bounded(most / 1e3, length) if unit == "mm" else is_bounded(np.radians(most))
+    near = check_bounded(most / 1e3, length) if unit == "mm" else check_bounded(np.radians(most))
     worst = f"{round_digits(most)}{SIGNS[unit]}" if near else f"more, {NOT_BOUNDED}"
     return f"{part}; error of the platform per 0.1°: {round_digits(float(here.min()))}{SIGNS[unit]} to {worst}."

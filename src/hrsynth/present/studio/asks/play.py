@@ -8,23 +8,23 @@ import numpy as np
 
 from ....analysis.configuration_report import ConfigurationAnalysis
 from ....analysis.modes.self_motions import follow_motion
-from ....budgets import LARGEST_STUDIO_LIST
+from ....budgets import STUDIO_LIST_NAMES_MAX
 from ....errors import BadRequest
-from ....kinematics.tasks import FixedValuesTask, system
+from ....kinematics.tasks import FixedValuesTask, stack_task
 from ....kinematics.velocity_relation import ObservationModel
-from ...view.states import Posed
+from ...view.states import RealAndHiddenState
 from ..request import Request
-from .move import state
+from .move import describe_state
 
-STEPS = 12
+PLAY_CONFIGURATIONS_COUNT = 12
 """Configurations in each direction."""
 
 
 def answer(request: Request) -> dict[str, Any]:
     """Return the motion along the unobserved twist number ``lost`` at ``here``, as ``watch`` lists them; only ``here``
     if the directions stay constant to first order only."""
-    number = request.count("lost", 0, LARGEST_STUDIO_LIST)
-    setup, mover = request.seeing(), request.mover(request.flag("hidden"))
+    number = request.count("lost", 0, STUDIO_LIST_NAMES_MAX)
+    setup, mover = request.seeing(), request.mover(request.has_flag("hidden"))
     here = request.here(mover)
     lost = ConfigurationAnalysis.of(setup).examine(here.real).hidden.unobserved
     if number is None or number >= len(lost):
@@ -32,27 +32,31 @@ def answer(request: Request) -> dict[str, Any]:
     question = setup.samples.observation_model
     ways = [
         mover.follow_hidden(here, way)
-        for way in follow_motion(here.real, question, lost[number].twist[: question.twist_rows], STEPS)
+        for way in follow_motion(
+            here.real, question, lost[number].twist[: question.twist_rows], PLAY_CONFIGURATIONS_COUNT
+        )
     ]
     frames = {
-        id(each): {**state(request, mover, each), "here": request.describe_here(each)}
+        id(each): {**describe_state(request, mover, each), "here": request.describe_here(each)}
         for each in (here, *ways[0], *ways[1])
     }
-    cycle = [here, *_there_and_back(ways[0]), here, *_there_and_back(ways[1])]
+    cycle = [here, *_mirror_path(ways[0]), here, *_mirror_path(ways[1])]
     return {
         "frames": [frames[id(each)] for each in cycle],
-        "words": _words(lost[number].name, question, here, [*ways[0], *ways[1]]),
+        "words": _describe_play(lost[number].name, question, here, [*ways[0], *ways[1]]),
     }
 
 
-def _there_and_back(way: list[Posed]) -> list[Posed]:
+def _mirror_path(way: list[RealAndHiddenState]) -> list[RealAndHiddenState]:
     return [*way, *reversed(way[:-1])]
 
 
-def _words(name: str, question: ObservationModel, here: Posed, way: list[Posed]) -> str:
+def _describe_play(
+    name: str, question: ObservationModel, here: RealAndHiddenState, way: list[RealAndHiddenState]
+) -> str:
     """Describe the motion, and how constant the directions are."""
     if not way:
         return f"{name}: no finite motion found; the observed directions are constant to first order only"
     held = FixedValuesTask.at(here.real.model, here.real.q, question.reference, question.observations)
-    worst = max(float(np.linalg.norm(system(each.real.model, each.real.q, held)[0])) for each in way)
+    worst = max(float(np.linalg.norm(stack_task(each.real.model, each.real.q, held)[0])) for each in way)
     return f"{name}: the observed directions stay constant; residual of loops and directions {worst:.0e}"

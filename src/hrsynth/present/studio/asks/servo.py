@@ -11,13 +11,13 @@ from ....errors import BadRequest
 from ....geometry.vectors import Array
 from ....simulation.camera import Camera, Cylinder, cylinders, place_camera
 from ....simulation.servo import ServoTask
-from ....tolerances import SLIDER_ARRIVED
-from ...view.states import Mover, Posed
-from ..commands import NONE, at_pose, lines, same_at
+from ....tolerances import SLIDER_TARGET_TOL
+from ...view.states import Mover, RealAndHiddenState
+from ..commands import NONE, format_commands, format_pose, is_reproduced_by_pose
 from ..request import Request
-from .move import state
+from .move import describe_state
 
-FRAMES = 60
+RUN_FRAMES_COUNT = 60
 """Frames of a run."""
 
 Poses = Callable[[str], Array]
@@ -25,7 +25,7 @@ Poses = Callable[[str], Array]
 
 def answer(request: Request) -> dict[str, Any]:
     """Return the run from ``here`` to the configuration ``end``, or to the coordinates ``goal``."""
-    setup, mover = request.seeing(), request.mover(request.flag("hidden"))
+    setup, mover = request.seeing(), request.mover(request.has_flag("hidden"))
     start = request.here(mover)
     end = _send_to(request, mover, start) if request.fields.get("end") is None else request.here(mover, "end")
     task = ServoTask.between(setup, start.real, end.real)
@@ -33,42 +33,44 @@ def answer(request: Request) -> dict[str, Any]:
     reference, rods = setup.mechanism.reference, cylinders(setup.mechanism, setup.observed)
     eye = place_camera(rods, reference, (start.real.pose, end.real.pose))
     last = len(found.run.times) - 1
-    chosen = sorted({round(last * part) for part in np.linspace(0, 1, FRAMES)})
+    chosen = sorted({round(last * part) for part in np.linspace(0, 1, RUN_FRAMES_COUNT)})
     way = mover.follow_hidden(start, [found.run.configurations[i] for i in chosen])
     frames = [
         {
-            **state(request, mover, posed),
+            **describe_state(request, mover, posed),
             "here": request.describe_here(posed),
             "t": float(found.run.times[i]),
             "e": found.run.commands[i].size,
-            "image": image(eye, reference, rods, posed.real.pose),
+            "image": project_legs(eye, reference, rods, posed.real.pose),
         }
         for i, posed in zip(chosen, way, strict=False)
     ]
-    poses = [at_pose(setup, each.real) for each in (start, end)]
-    same = lines(request, "servo", start=poses[0], goal=poses[1])
+    poses = [format_pose(setup, each.real) for each in (start, end)]
+    same = format_commands(request, "servo", start=poses[0], goal=poses[1])
     return {
         "frames": frames,
-        "desired": image(eye, reference, rods, end.real.pose),
+        "desired": project_legs(eye, reference, rods, end.real.pose),
         "size": [eye.width, eye.height],
         "kind": found.outcome,
         "words": f"Outcome: {found.outcome} ({found.run_outcome.reason}), after {found.run.times[-1]:.3g} s",
-        **(same if same_at(setup, start.real, end.real) else NONE),
+        **(same if is_reproduced_by_pose(setup, start.real, end.real) else NONE),
     }
 
 
-def _send_to(request: Request, mover: Mover, start: Posed) -> Posed:
+def _send_to(request: Request, mover: Mover, start: RealAndHiddenState) -> RealAndHiddenState:
     """Track the robot to the coordinates ``goal``."""
     goal = request.vector("goal", len(mover.coordinates.places))
-    if goal is None or mover.far(goal):
+    if goal is None or mover.is_beyond_sliders(goal):
         raise BadRequest("goal", None if goal is None else goal.tolist(), "values within reach of the sliders")
     end, reached = mover.send(start, goal)
-    if np.max(np.abs(reached - goal), initial=0.0) > SLIDER_ARRIVED:
+    if np.max(np.abs(reached - goal), initial=0.0) > SLIDER_TARGET_TOL:
         raise BadRequest("goal: not reached from the start", goal.tolist(), remedy="Choose a goal closer to the start.")
     return end
 
 
-def image(eye: Camera, reference: str, rods: tuple[Cylinder, ...], poses: Poses) -> list[list[list[float]] | None]:
+def project_legs(
+    eye: Camera, reference: str, rods: tuple[Cylinder, ...], poses: Poses
+) -> list[list[list[float]] | None]:
     """Return the two ends of each observed leg in the image (pixels); None for one that is behind it."""
     found: list[list[list[float]] | None] = []
     for rod in rods:
