@@ -534,12 +534,12 @@ def test_check_text_names_the_singularity(run):
     assert (answer.status, answer.err) == (0, "")
     for line in (
         r"^pose +x=0,y=0.333205,",
-        r"^mobility +2, of which 0 idle; the platform has 2 freedoms$",
+        r"^mobility +2, of which 0 internal; the platform has 2 dof$",
         r"^hidden robot +the directions show 1 of 2: Type 2 singularity ",
         r"RI 0  RO 1  II 1  IO 0",
-        r"^not seen +translation along x\b",
+        r"^unobserved +translation along x\b",
         r"^real robot +the motors determine 2 of 2: regular ",
-        r"^redundant +the loop end: 3 of its constraints$",
+        r"^redundant +loop end: 3 of its constraints$",
     ):
         assert re.search(line, answer.out, re.MULTILINE), answer.out
 
@@ -631,7 +631,7 @@ def test_check_answers_3_where_a_rank_is_not_clear(run, monkeypatch: pytest.Monk
     monkeypatch.setattr("hrsynth.analysis.configuration_report.RANK_GAP", 1e30)
     asked = run("check", "3rrr_m1", "--at", "x=0.01")
     assert asked.status == 3
-    assert "not decided (smallest rank gap" in asked.out
+    assert "undecided (smallest rank gap" in asked.out
     assert re.fullmatch(r"hrsynth: 3rrr_m1 at x=.*: the singular values leave a gap of .*, needed: .*\n", asked.err)
     assert run("check", "3rrr_m1", "--grid", "x=0:0.01:2").status == 0
 
@@ -689,7 +689,7 @@ def test_advise_json_where_nothing_is_missing(run):
     data = run("advise", "quattro", "--observe", "1,4", "--json").data
     check_record(data, "advise", "quattro")
     assert (data["verdict"], data["nothing_missing"], data["sets"], data["size"]) == ("controllable", True, [], 0)
-    assert run("advise", "quattro", "--observe", "1,4").out.endswith("\nNothing is missing\n")
+    assert run("advise", "quattro", "--observe", "1,4").out.endswith("\nNo measurement is missing\n")
 
 
 @pytest.mark.parametrize(
@@ -699,7 +699,7 @@ def test_advise_json_where_nothing_is_missing(run):
             ["uranesx"],
             [
                 r"^verdict +partially controllable \(rank 2 of 3\)$",
-                r"^lost at zero +translation along z$",
+                r"^unobserved at zero +translation along z$",
                 r"^Controllable \(rank 3 of 3\) with one more measurement, 6 ways",
                 r"^  position of an observed line: any of rod_1a, rod_2a, rod_3a$",
                 r"^  encoder on a joint: any of guide_1\*, guide_2\*, guide_3\*$",
@@ -945,7 +945,7 @@ def test_path_of_too_few_legs_is_undecided(run, name: str):
 def test_path_text_has_the_verdict_the_path_and_what_is_not_proved(run):
     answer = run("path", "quattro", "--observe", "1,4", "--start", "x=0.05", "--goal", "x=-0.05,phi=20deg")
     assert (answer.status, answer.err) == (0, "")
-    assert re.search(r"^verdict +same aspect \(certified\)$", answer.out, re.MULTILINE)
+    assert re.search(r"^verdict +same aspect \(proved\)$", answer.out, re.MULTILINE)
     assert re.search(r"^path +x=0.05,", answer.out, re.MULTILINE)
     assert re.search(r"^not proved +collisions", answer.out, re.MULTILINE)
 
@@ -1016,7 +1016,7 @@ def test_modes_text_numbers_them_and_says_what_is_proved(run):
     said = r"^modes +2 real of 6 complex, proved to be all among poses in the plane of motion$"
     assert re.search(said, answer.out, re.MULTILINE)
     assert len(re.findall(r"^mode \d", answer.out, re.MULTILINE)) == 2
-    assert answer.out.count("(the pose itself)") == 1
+    assert answer.out.count("(the given pose)") == 1
 
 
 @pytest.mark.parametrize(
@@ -1066,9 +1066,9 @@ def test_servo_text_names_the_mode_and_how_far_it_is(run):
         "5",
     )
     assert (answer.status, answer.err) == (0, "")
-    assert re.search(r"^ended +mode after", answer.out, re.MULTILINE)
+    assert re.search(r"^outcome +mode after", answer.out, re.MULTILINE)
     assert "its assembly mode 2 of 2" in answer.out
-    assert "mm and 0 degrees from the goal" in answer.out
+    assert "mm and 0 deg from the goal" in answer.out
     assert answer.out.count("(the goal)") == 1
 
 

@@ -56,8 +56,8 @@ def test_a_turn_about_one_axis_is_told_in_one_way_however_it_was_typed(
 
 @pytest.mark.parametrize("command", ["modes", "aspects"])
 def test_what_is_held_is_called_what_it_is(printed, command: str):
-    assert "held      what is observed at" in printed(f"{command} 3rpr_m1 --sensor encoder:slide_1")
-    assert "held      the observed directions at" in printed(f"{command} 3rpr_m1")
+    assert "fixed     measured values at" in printed(f"{command} 3rpr_m1 --sensor encoder:slide_1")
+    assert "fixed     observed directions at" in printed(f"{command} 3rpr_m1")
 
 
 def test_turns_are_those_of_the_platform(printed):
@@ -134,7 +134,7 @@ def test_printed_axes_have_that_sense(printed, name: str):
 @pytest.mark.parametrize(
     ("command", "said"),
     [
-        ("check rrrrr_m1 --at x=0,y=0.3332", "one degree of error in the directions: not bounded to first order"),
+        ("check rrrrr_m1 --at x=0,y=0.3332", "not bounded to first order, per degree of direction error"),
         ("accuracy rrrrr_m1 --cone 0.1deg --at x=0,y=0.3332", "position     not bounded to first order"),
         (
             "accuracy rrrrr_m1 --cone 0.1deg --grid x=0:0.02:2,y=0.3331:0.3332:2",
@@ -154,25 +154,25 @@ def test_numbers_beyond_sense_are_not_printed(printed, command: str, said: str):
 
 
 def test_numbers_with_sense_are_printed(printed):
-    assert re.search(r"to first order: 5\.27 mm and 0\.816 degrees", printed("check rrrrr_m1"))
+    assert re.search(r"error gain +5\.27 mm and 0\.816 deg per degree of direction error", printed("check rrrrr_m1"))
 
 
 @pytest.mark.parametrize(
     ("robot", "grid", "lines"),
     [
-        ("quattro", "x=-0.1:0.1:3,y=0:0.1:3", ["free, at each pose nearest to the zero configuration: z = -0.7, phi"]),
+        ("quattro", "x=-0.1:0.1:3,y=0:0.1:3", ["free, chosen nearest to the zero configuration: z = -0.7, phi"]),
         (
             "quattro",
             "x=-0.1:0.1:3,z=-0.7",
-            ["held: z=-0.7", "free, at each pose nearest to the zero configuration: y = 0, phi"],
+            ["fixed: z=-0.7", "free, chosen nearest to the zero configuration: y = 0, phi"],
         ),
-        ("quattro", "x=-0.1:0.1:3,y=0,z=-0.7,phi=10deg", ["held: y=0,z=-0.7,phi=10deg", "no part is free"]),
+        ("quattro", "x=-0.1:0.1:3,y=0,z=-0.7,phi=10deg", ["fixed: y=0,z=-0.7,phi=10deg", "no free coordinate"]),
         (
             "gough_stewart",
             "x=-0.01:0.01:2,y=0,z=0.3,phi=0",
-            ["held: y=0,z=0.3,phi=0", "free, at each pose nearest to the zero configuration: orientation but phi"],
+            ["fixed: y=0,z=0.3,phi=0", "free, chosen nearest to the zero configuration: orientation but phi"],
         ),
-        ("rrrrr_m1", "x=0:0.02:2,y=0.2:0.22:2", ["no part is free"]),
+        ("rrrrr_m1", "x=0:0.02:2,y=0.2:0.22:2", ["no free coordinate"]),
     ],
 )
 def test_a_grid_says_what_it_held(printed, robot: str, grid: str, lines: list[str]):

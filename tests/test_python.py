@@ -69,7 +69,7 @@ def test_a_wrong_keyword_is_told_with_the_nearest_and_all(ask: Any, near: str):
         (lambda: hrsynth.save("3rrr_m1", "x.xml", meshes="move"), "keep, copy"),
         (lambda: hrsynth.branch("rrrrr_m1", [1, 2]), "hip=-1:1"),
         (lambda: hrsynth.branch("rrrrr_m1", "shoulder_1"), "^a box of motors: got 'shoulder_1', expected low:high"),
-        (lambda: hrsynth.draw(5), "what a function of hrsynth answers"),
+        (lambda: hrsynth.draw(5), "draw: not a result"),
         (lambda: hrsynth.check("rrrrr_m1", seed="a"), "seed: got 'a', expected an integer"),
         (lambda: hrsynth.check("rrrrr_m1", seed=-1), "at least 0"),
         (lambda: hrsynth.observe("rrrrr_m1", seed=-1), "at least 0"),

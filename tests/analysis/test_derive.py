@@ -325,7 +325,7 @@ def test_of_proposals_that_were_taken_back_the_first_is_printed() -> None:
         ["all", "no"],
         ["all", "yes"],
     ]
-    assert f"{len(proposals) - 1} more proposals, taken back as well" in " ".join(" ".join(printed).split())
+    assert f"{len(proposals) - 1} more proposals, also discarded" in " ".join(" ".join(printed).split())
     assert any(line.startswith("keep ") for line in printed)
 
 
@@ -557,4 +557,4 @@ def test_a_zero_configuration_that_shows_fewer_freedoms_is_named():
     found = derive("3rrr_m1", at=at.pose("platform"))
     assert found.verdict.verdict == CONTROLLABLE
     assert found.verdict.rank_at_zero == found.to_dict()["rank_at_zero"] == 2
-    assert "only 2 of 3 freedoms seen: the zero configuration is a Type 2 singularity" in hrsynth.text(found)
+    assert "only 2 of 3 dof observed: the zero configuration is a Type 2 singularity" in hrsynth.text(found)

@@ -418,8 +418,8 @@ def test_a_robot_may_see_less_than_its_architecture() -> None:
     assert record["architecture"]["exact"] is True
     (row,) = [row for row in re.split(r"\n(?=\S)", text.derivation(found)) if row.startswith("architecture")]
     line = " ".join(row.split())
-    assert "generic geometry sees 6 of 6" in line
-    assert "this robot 5" in line
+    assert "rank 6 of 6 for generic geometry" in line
+    assert "5 for this robot" in line
 
 
 @pytest.mark.some(2)
@@ -492,14 +492,14 @@ def test_what_is_not_decided_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     assert not any(each.exact for each in found.exact)
     assert [each["architecture"]["verdict"] for each in found.to_dict()["sets"]] == [None] * 3
     printed = text.legs(found)
-    assert printed.count("not decided") == 4
-    assert "not decided in exact arithmetic: crowded" in printed
+    assert printed.count("undecided") == 4
+    assert "undecided in exact arithmetic: crowded" in printed
     line = next(
         line
         for line in text.derivation(derive(prepare_robot("rrrrr_m1"))).splitlines()
         if line.startswith("architecture")
     )
-    assert line.endswith("not decided: crowded")
+    assert line.endswith("undecided: crowded")
 
 
 def test_the_numbers_drawn_are_many() -> None:

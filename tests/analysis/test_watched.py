@@ -84,8 +84,8 @@ def test_mobility_is_that_of_the_normal_form_and_that_of_the_file(tmp_path):
 
 
 def test_the_table_of_legs_says_where_freedoms_are_lost():
-    assert "lost (at mode:2)" in str(legs("3rrr_m1", at="mode:2"))
-    assert "lost (at the zero configuration)" in str(legs("3rrr_m1"))
+    assert "unobserved (at mode:2)" in str(legs("3rrr_m1", at="mode:2"))
+    assert "unobserved (at the zero configuration)" in str(legs("3rrr_m1"))
 
 
 def test_half_a_turn_is_printed_as_a_positive_one():

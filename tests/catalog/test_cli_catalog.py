@@ -167,7 +167,7 @@ def test_show_draws_and_writes_a_robot(run, tmp_path: Path):
         r"verdict +controllable \(rank 3 of 3\)",
         r"exact +proved",
         r"legs needed +\{1, 2, 3\}",
-        r"modes +2 real seen of 6 complex; near modes not counted",
+        r"modes +2 real found of 6 complex; near modes not counted",
         rf"The robot is written to {re.escape(str(file))}\.",
     ):
         assert re.search(f"^{line}$", out, re.MULTILINE), out

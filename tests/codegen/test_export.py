@@ -261,8 +261,8 @@ def test_motors_that_the_box_takes_beyond_their_limits_are_told() -> None:
     )
     wide, within = ({"motor": (-half, half)} for half in (0.25, 0.2))
     assert "motor -0.2 to 0.3 (within -0.25 to 0.25)" in export(limited, box=wide).code
-    assert "passed by the box: motor -0.2 to 0.3" in f"{hrsynth.branch(limited, wide)}"
-    assert "passed" not in f"{hrsynth.branch(limited, within)}{hrsynth.branch(limited)}{hrsynth.branch(robot, wide)}"
+    assert "exceeded by the box, of motors: motor -0.2 to 0.3" in f"{hrsynth.branch(limited, wide)}"
+    assert "exceeded" not in f"{hrsynth.branch(limited, within)}{hrsynth.branch(limited)}{hrsynth.branch(robot, wide)}"
 
 
 @pytest.mark.slow
@@ -300,8 +300,8 @@ def test_it_says_why_it_answers_in_no_more() -> None:
     text = str(found)
     assert part.volume_fraction < 1
     assert [f"at {part.motors[0]}={end.q[0]:.4g}" in text for end in part.toggles] == [True] * len(part.toggles)
-    assert "can move while all motors rest" in text
-    assert "\nends" not in str(exported(four_bar(), 0.4))
+    assert "can move while all motors are fixed" in text
+    assert "\nproof ends" not in str(exported(four_bar(), 0.4))
 
 
 @pytest.mark.slow

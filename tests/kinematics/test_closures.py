@@ -258,7 +258,7 @@ def test_beyond_limits_names_the_joints_of_the_closure_that_was_found() -> None:
     assert (found.verdict, found.beyond) == (BEYOND, (shoulder.name, elbow.name))
     free = with_limits(with_limits(mechanism, elbow.name, 0.05, 6.2), shoulder.name, low, high)
     assert assembled(free, np.eye(4)).verdict == ASSEMBLED
-    assert "only beyond limits of joints: as found, of joint_1_1, joint_1_2" in words_of(found)
+    assert "only beyond joint limits: as found, of joint_1_1, joint_1_2" in words_of(found)
 
 
 def words_of(found: Assembly) -> str:

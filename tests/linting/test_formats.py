@@ -181,7 +181,7 @@ def test_text_names_place_rule_and_mend(bad: Path):
     text = str(hrsynth.lint(bad))
     finding = next(each for each in hrsynth.lint(bad).findings if each.rule == "limits-order")
     assert f"{bad}:{finding.line}: error: {finding.message} [limits-order]\n" in text
-    assert "    \u2192 exchange the two numbers (--fix does it)" in text
+    assert "    \u2192 exchange the two numbers (--fix applies it)" in text
     assert text.splitlines()[-1].startswith("1 file: 1 error, 0 warnings, ")
     element = bad.read_text().splitlines()[finding.line - 1]
     assert "<limit" in element
@@ -260,7 +260,7 @@ def test_json_and_fix_on_the_command_line(bad: Path, capsys):
     assert [(each["rule"], each["fixable"]) for each in record["mended"]] == [("limits-order", True)]
     assert record["counts"]["error"] == 0
     assert execute(["lint", str(bad), "--fix"]) == 0
-    assert f"The mended file is written to {bad}." in capsys.readouterr().out
+    assert f"The fixed file is written to {bad}." in capsys.readouterr().out
     assert bad.read_text() == Path("mended.urdf").read_text()
 
 

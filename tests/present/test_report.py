@@ -132,7 +132,7 @@ def test_picture_and_plain_answer_come_first_and_the_derivation_is_folded(name: 
     first = root.xpath("//header//*[@class='hero']")[0]
     assert [each.get("aria-label") for each in first.iter("svg")] == [f"Drawing of {name}"]
     said = text_of(first.xpath(".//ul")[0])
-    assert f"shows {found.verdict.rank} of the platform's {found.dof} freedoms" in said
+    assert f"shows {found.verdict.rank} of {found.dof} platform dof" in said
     folded = root.xpath("//details//*[@data-steps or @data-step]")
     assert folded == root.xpath("//*[@data-steps or @data-step]") != []
     assert all(each[0].tag == "summary" and each.get("open") is None for each in root.iter("details"))
@@ -392,5 +392,5 @@ def test_a_report_speaks_of_what_is_seen_whatever_kind_it_is(tmp_path: Path):
     assert asked.minimal == (("1", "point_1"), ("point_1", "distance_1"))
     assert "Fewest observations that show 3 of 3: 1, point_1; point_1, distance_1." in said
     assert "movesB1alongτ1,B4alongr4andB5normaltor5" in said.replace(" ", "")
-    assert "At home 1 pose has the same measurements" in said
-    assert "Measurements wrong by 0.1°, 1mm put the platform off" in said
+    assert "At the zero configuration, 1 pose has the same measurements" in said
+    assert "Measurement errors of 0.1°, 1mm move the platform" in said

@@ -171,7 +171,7 @@ def test_a_derivation_is_drawn_as_two_schemes(name: str, observe: list[str] | No
 
 def test_what_has_no_picture_is_refused():
     for found in (answer("legs"), answer("check"), answer("accuracy")):
-        with pytest.raises(BadRequest, match="no picture"):
+        with pytest.raises(BadRequest, match="no figure"):
             hrsynth.draw(found)
     with pytest.raises(BadRequest, match="plane"):
         hrsynth.draw(answer("modes"), plane="z=0")

@@ -362,7 +362,7 @@ def test_the_scale_says_its_thresholds_and_where_the_platform_is(open_page):
     legend = {each["key"]: each for each in ask(tab, "stage.legend()")}
     assert [key for key, each in legend.items() if each["now"]] == [f"step{error['step']}"]
     assert "1 to 3 mm per 0.1°" in legend["step1"]["words"]
-    assert "lost" in legend["step4"]["words"]
+    assert "singular" in legend["step4"]["words"]
     assert error["words"] in tab.page.locator("body").inner_text()
     ask(tab, "stage.state({ ...scene.state, error: { step: null } })")
     (now,) = [each["key"] for each in ask(tab, "stage.legend()") if each["now"]]
@@ -479,6 +479,8 @@ def test_what_lies_on_the_pane_covers_nothing_of_the_robot(open_page, size: dict
 
 def test_another_robot_takes_the_place_of_the_first_and_gives_back_what_it_held(open_page):
     tab = open_page("delta")
+    ask(tab, "stage.ghosts(scene.ghosts)")
+    rest(tab)
     held = ask(tab, "[stage.renderer.info.memory.geometries, stage.renderer.info.memory.textures]")
     for _ in range(4):
         ask(tab, "stage.lost([{twist: [0, 0, 1, 0, 0, 1], point: [0, 0, 0]}]); stage.plane(null)")

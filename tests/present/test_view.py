@@ -81,7 +81,7 @@ def test_a_slider_moves_one_coordinate_and_keeps_the_others(name: str):
 def test_the_hidden_robot_shows_the_same_directions_and_platform(name: str):
     found = seen(name)
     if len(found.machines) == 1:
-        assert "every leg is blind: there is no hidden robot" in found.notes
+        assert "every observed direction is constant: there is no hidden robot" in found.notes
         return
     real, hidden = (list(machine.links) for machine in found.machines)
     for state in states(found):

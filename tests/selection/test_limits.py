@@ -46,9 +46,9 @@ def test_poses_beyond_limits_are_named(limited: Path):
     assert 0 < sum(beyond) < len(beyond)
     found = hrsynth.accuracy(limited, cone="0.1deg", at=[f"x={x},y=0,phi=0" for x in values])
     assert [each.beyond_limits for each in found.poses] == [("shoulder_1",) if far else () for far in beyond]
-    assert "beyond those of shoulder_1" in str(found)
+    assert "exceeded: shoulder_1" in str(found)
     checked = str(hrsynth.check(limited, grid="x=-0.04:0.04:9,y=0,phi=0"))
-    assert f"{sum(beyond)} beyond limits of joints" in checked
+    assert f"{sum(beyond)} beyond joint limits" in checked
     assert "those of shoulder_1 are not checked" in str(
         hrsynth.accuracy(limited, cone="0.1deg", grid="x=-0.04:0.04:9,y=0,phi=0")
     )

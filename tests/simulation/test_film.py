@@ -52,7 +52,7 @@ def test_what_a_film_does_not_draw_is_refused_before_the_run(
         == 2
     )
     (line,) = capsys.readouterr().err.splitlines()
-    assert "an animation draws the legs that are watched" in line
+    assert "an animation shows observed legs only" in line
     assert ".png" in line
 
 

@@ -303,10 +303,10 @@ def test_the_pose_that_a_grid_holds_is_told_whole(robot: str, grid: str) -> None
     """Asked at what varies and what is told to be held, the error is that of the grid's first pose."""
     found = accuracy(load(robot), cone=CONE, grid=grid)
     assert found.field is not None
-    told = re.search(r"^held +(.*)$", text(found), re.MULTILINE)
+    told = re.search(r"^fixed +(.*)$", text(found), re.MULTILINE)
     assert told is not None
     if robot == "prrrp_m1":
-        assert told[1] == "nothing; free, at each pose nearest to the zero configuration: y, phi"
+        assert told[1] == "nothing; free, chosen nearest to the zero configuration: y, phi"
         return
     assert {"x", "y", "z"} <= {each.split("=")[0] for each in f"{grid},{told[1]}".split(",")}
     first = ",".join(f"{name}={float(values[0])!r}" for name, values in found.field.grid.axes)

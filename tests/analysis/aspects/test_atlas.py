@@ -114,8 +114,8 @@ def test_limits_that_no_path_considers_are_named():
     paths = [pair.answer for pair in found.pairs if pair.verdict == SAME and pair.answer is not None]
     assert paths
     assert all(each.limits_ignored == (elbow.name,) for each in paths)
-    assert str(found).rstrip().endswith(f"limits of joints {elbow.name}")
-    assert "limits of joints" not in str(atlas_of("quattro", "1,4"))
+    assert str(found).rstrip().endswith(f"joint limits of {elbow.name}")
+    assert "joint limits" not in str(atlas_of("quattro", "1,4"))
 
 
 def test_the_shipped_quattro_changes_its_mode_without_a_singularity():

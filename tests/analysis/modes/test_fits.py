@@ -156,5 +156,5 @@ def test_the_pose_itself_is_a_mode_wherever_it_is_said_to_be():
     found = modes(load(list_robots()["delta"]), at="x=0.05,y=0.02,z=-0.6")
     first = replace(found.modes[0], proved=False, match_residual=1e-15)
     said = text(replace(found, modes=(first,)))
-    assert "a mode by construction, its place not proved" in said
+    assert "a mode by construction, pose not proved" in said
     assert "which does not prove it" not in said.split("mode 1")[1]

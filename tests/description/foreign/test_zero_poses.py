@@ -100,7 +100,7 @@ def test_every_question_is_answered_at_a_dead_point(tmp_path: Path):
     (posture,) = check(robot).postures
     generic = legs(robot).sets[-1]
     assert posture.hidden.rank == posture.dof
-    assert f"but special: {generic.dof - generic.rank} fewer are lost than at generic poses" in str(check(robot))
+    assert f"but not generic: {generic.dof - generic.rank} fewer unobserved than at generic poses" in str(check(robot))
     assert modes(robot).found.continuous_family is not None
     assert derive(robot).verdict.rank == generic.rank
 

@@ -165,7 +165,7 @@ def test_a_lost_freedom_is_played_with_the_directions_at_rest():
     places = np.array([frame["real"] for frame in found["frames"]])
     assert np.array(rests) == pytest.approx(np.broadcast_to(rests[0], np.shape(rests)), abs=CLOSED)
     assert np.ptp(places, axis=0).max() > 0.05
-    with pytest.raises(BadRequest, match="none is lost"):
+    with pytest.raises(BadRequest, match="expected none"):
         ask("play", "rrrrr_m1", lost=0)
 
 
@@ -192,7 +192,7 @@ def test_aspects_are_those_of_the_atlas(robot: str, aspect: list[int]):
     assert found["groups"] == [list(group) for group in same.groups]
     assert found["aspect"] == aspect
     assert all(each.certified for each in same.pairs)
-    assert found["pairs"][0].startswith("modes 1 and 2: separated (certified)")
+    assert found["pairs"][0].startswith("modes 1 and 2: separated (proved)")
 
 
 @pytest.mark.slow
@@ -260,7 +260,7 @@ def test_the_plain_answer_agrees_with_legs_and_modes(robot: str):
     known = legs(robot)
     controllable = any(each == "controllable" for each in known.sets)
     assert len(found["sentences"]) == 3
-    assert found["sentences"][0].startswith("Watch leg") == controllable
+    assert found["sentences"][0].startswith("Observe leg") == controllable
     if controllable:
         assert tuple(found["watch"]) in known.minimal
         others = [mode for mode in modes(robot, found["watch"]).modes if not mode.goal]
@@ -368,12 +368,12 @@ def test_a_smallest_set_that_sees_less_at_zero_is_told_as_by_legs(tmp_path: Path
     (told_once,) = [
         line
         for line in " ".join(hrsynth.text(hrsynth.derive(told.setup)).split()).split("at zero")
-        if "freedoms seen" in line
+        if "dof observed" in line
     ]
     assert found["sets"] == [
         {
             "legs": ["1", "2"],
-            "words": "controllable; only 1 of 2 freedoms seen: the zero configuration is a Type 2 singularity",
+            "words": "controllable; only 1 of 2 dof observed: the zero configuration is a Type 2 singularity",
         }
     ]
     assert found["sets"][0]["words"].removeprefix("controllable; ") in told_once
@@ -422,10 +422,10 @@ def test_at_a_singularity_no_error_is_told():
 def test_the_error_of_orientation_is_told_where_the_platform_turns(robot: str):
     setup = observe(robot)
     wrong, turns = error(setup, setup.all_samples.start), setup.motion.rotations.shape[1] > 0
-    assert ("turned by about" in wrong["words"]) == (turns and wrong["words"] != LOST)
+    assert ("rotation about" in wrong["words"]) == (turns and wrong["words"] != LOST)
     if turns:
         found = hrsynth.accuracy(robot, cone=CONE_TEXT).to_dict()["poses"][0]["orientation_deg"]["largest"]
-        assert f"turned by about {round_digits(found)}°" in wrong["words"]
+        assert f"rotation about {round_digits(found)}°" in wrong["words"]
 
 
 @pytest.mark.slow

@@ -434,7 +434,7 @@ def test_why_runs_are_simulated_one_by_one_is_told():
 def test_hollow_marks_are_in_the_legend_where_there_is_one(grid: str, hollow: bool):
     found = hrsynth.basins("3rrr_m1", goal="x=0,y=0,phi=0", grid=grid, jobs=1)
     drawn = picture(found, replace(PNG, ending=".svg")).decode()
-    assert ("hollow: at another" in drawn) == hollow
+    assert ("hollow: other" in drawn) == hollow
 
 
 @pytest.mark.slow

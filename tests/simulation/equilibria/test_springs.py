@@ -262,7 +262,7 @@ def test_words_except_legs_without_a_length() -> None:
     """Where rests are those of springs, legs that are not watched may be telescopic ones."""
     told = CompletenessReport(SubdivisionResult((), (), 0.0, 10, True, loop=SpringError.about(of_robot())), (), 0, None)
     found: Any = SimpleNamespace(cover=told, setting=scenes.setting("gough_stewart", ("1", "3", "5")))
-    assert "leg 2 or 4 or 6 is stretched or has no length, or a watched direction is" in _complete(found)[0]
+    assert "leg 2 or 4 or 6 is stretched or has length zero, or an observed direction is" in _complete(found)[0]
 
 
 def test_a_zero_may_be_another_than_that_of_a_box() -> None:

@@ -17,7 +17,7 @@ from typing import Any
 
 from ...budgets import LARGEST_ANSWER, MOST_WAITING, WORKER_START_SECONDS
 
-DESK = "hrsynth.present.studio.analysis_service:Desk"
+DESK = "hrsynth.present.studio.analysis_service:AnalysisService"
 """Class that answers."""
 START = (
     "import sys, json; sys.path[:] = json.loads(sys.argv[1]); from {} import main; main(int(sys.argv[2]), sys.argv[3])"

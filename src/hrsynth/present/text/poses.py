@@ -512,7 +512,7 @@ _SIGNS = {SAME: "=", SEPARATED: "|", UNDECIDED_PAIR: "?"}
 def aspects(found: AspectTable) -> str:
     """Return the modes, their aspects, the table of pairs, and the verdict on each pair that was examined."""
     listed = found.listed
-    rows = [*head(listed.setup), ("held", f"{_describe_held(listed)} at {listed.pose}")]
+    rows = [*head(listed.setup), ("fixed", f"{_describe_held(listed)} at {listed.pose}")]
     if listed.found.continuous_family is not None:
         return listing([*rows, *known_row("singular", listed.found.singular_solutions)])
     rows += [

@@ -393,7 +393,7 @@ def _missing(found: Advice) -> list[str]:
     what = "one more measurement" if found.size == 1 else f"{found.size} more measurements"
     if any(each.cost != len(each.measurements) for each in found.sets):
         what = f"further measurements at a cost of {found.sets[0].cost:g}"
-    ways = "one set" if len(found.sets) == 1 else f"{len(found.sets)} sets"
+    ways = "one way" if len(found.sets) == 1 else f"{len(found.sets)} ways"
     lines = [
         f"{best.verdict.capitalize()} (rank {best.rank} of {best.dof}) with {what}, {ways}, smallest rank gap "
         f"{gap:.1e} (needed {RANK_GAP:.0e}):",
