@@ -141,7 +141,7 @@ def _alone(cover: CompletenessReport) -> list[str]:
     return [
         *(
             [
-                f"{len(some)} proved critical poses are not listed above: the robot was not assembled there, or the "
+                f"{len(some)} critical poses that boxes prove are not listed above: the robot was not assembled there, or the "
                 "computed command does not vanish (where joints lock):"
             ]
             if some

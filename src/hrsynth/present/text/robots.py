@@ -338,7 +338,7 @@ def describe_export(found: ExportedCode) -> str:
     for part in proof.parts:
         rows.append(
             (
-                "proved for",
+                "proved domain",
                 [f"{name} {low:.6g} to {high:.6g}" for name, low, high in zip(part.motors, *part.proved, strict=True)]
                 + [f"and in all of {part.in_cells}, {100 * part.volume_fraction:.4g} % of the box"],
             )

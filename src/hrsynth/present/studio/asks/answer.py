@@ -49,4 +49,4 @@ def rest(setup: ObservedRobot) -> list[str]:
     try:
         return [first, elsewhere(modes(setup))]
     except HrsynthError as problem:
-        return [first, f"Other poses at which the loop may stop cannot be listed: {problem}."]
+        return [first, f"Other poses at which the loop may stop are not listed: {problem}."]

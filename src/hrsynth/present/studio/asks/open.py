@@ -163,6 +163,6 @@ def offers(request: Request, found: ImportChoices) -> Iterator[dict[str, Any]]:
     yield offer(
         "as_written",
         said.get("as_written", False),
-        "if no: axes that are parallel or intersect up to rounding are made exact",
+        "if no: axes that are parallel or intersect up to rounding are snapped",
         [False, True],
     )

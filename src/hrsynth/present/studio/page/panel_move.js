@@ -39,7 +39,7 @@ class MovePanel extends Panel {
   moved(answer) {
     if (this.studio.moving) return;
     this.sliders.forEach((slider, i) => slider.read(this.studio.values[i]));
-    if (answer.stopped) this.status.say("The robot cannot move further in this direction.");
+    if (answer.stopped) this.status.say("Limit reached: no further motion in this direction.");
     else this.status.clear();
     if (answer.command) this.same.show(answer);
   }
