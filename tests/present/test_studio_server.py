@@ -356,7 +356,7 @@ def test_what_fails_is_one_line_and_the_next_is_answered(page: Page):
         ("refuse", {}, "nothing fits: got 7, expected less", "BadRequest"),
         ("defect", {}, "a defect of hrsynth itself, please report it: ZeroDivisionError: by zero", "Defect"),
         ("nan", {}, "a defect of hrsynth itself", "Defect"),
-        ("eat", {"bytes": 10**11}, "more memory than is allowed (4 GB)", "MemoryError"),
+        ("eat", {"bytes": 10**11}, "more memory than the limit (4 GB)", "MemoryError"),
         ("echo", {"text": "x", "times": 70_000_000}, "bytes, at most", "TooLarge"),
     ):
         answer = page.ask(kind, **fields)

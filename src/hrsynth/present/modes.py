@@ -227,10 +227,7 @@ def _heading(whole: Any, found: AssemblyModes, drawn: ModesScene) -> float:
     if drawn.rest:
         many += f"\nonly these intersections of the curves match leg{'s' * (len(drawn.rest) > 1)} "
         many += ", ".join(drawn.rest) + " too"
-    title = (
-        f"{setup.robot.name}   {setup.decomposition.architecture()}\nassembly modes with the same {held} as at "
-        f"{found.pose}: {many}"
-    )
+    title = f"{setup.robot.name}   {setup.decomposition.architecture()}\nassembly modes with fixed {held}: {many}"
     return settle_title(whole, whole.suptitle(title, fontsize=12, va="top"))
 
 

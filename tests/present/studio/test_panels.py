@@ -138,7 +138,7 @@ def test_the_error_that_is_shown_is_that_of_the_legs_that_are_watched(tab: Tab, 
         told = panel.locator(".verdict").inner_text()
         assert page.locator("#now").inner_text() in told
         assert page.evaluate("studio.state.error.step") == page.evaluate("studio.panels.legs.found.error.step")
-    assert "no bound" in page.locator("#now").inner_text()
+    assert "unbounded" in page.locator("#now").inner_text()
 
 
 @pytest.mark.parametrize("name", ["rrrrr_m1", "quattro"])
