@@ -61,7 +61,7 @@ def picture(found: Servo, paper: Paper = PNG) -> bytes:
     figure = empty_figure(paper.wide(WIDE), TALL)
     legs = ", ".join(found.setup.labels)
     word = "legs " if all(each.by_segment for each in found.setup.observed) else ""
-    title = figure.suptitle(f"{found.setup.robot.name}, {word}{legs} observed; outcome: {ENDS[found.outcome]}", va="top")
+    title = figure.suptitle(f"{found.setup.robot.name}, {word}{legs} observed: {ENDS[found.outcome]}", va="top")
     x, y, wide, tall = _robots(figure, found, settle_title(figure, title), len(panels))
     title.set_y(1 - GAP / 2 / figure.get_figheight())
     pictures = _pictures(found)

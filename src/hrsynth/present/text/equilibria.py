@@ -141,8 +141,8 @@ def _alone(cover: CompletenessReport) -> list[str]:
     return [
         *(
             [
-                f"{len(some)} critical poses that boxes prove are not listed above: the robot was not assembled there, or the "
-                "computed command does not vanish (where joints lock):"
+                f"{len(some)} critical poses that boxes prove are not listed above: the robot was not assembled there, "
+                "or the computed command does not vanish (where joints lock):"
             ]
             if some
             else []
