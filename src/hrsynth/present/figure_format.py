@@ -86,21 +86,20 @@ def paper_for(ending: str, width: str | None, font: str | None) -> Paper:
         found = re.fullmatch(r"(\d+\.?\d*) *(mm|cm|in)", width.strip(), re.ASCII)
         inches = 0.0 if found is None else float(found[1]) * MILLIMETRES[found[2]] / MILLIMETRES["in"]
         if not WIDTHS[0] <= inches <= WIDTHS[1]:
-            raise BadRequest("width of a figure", width, f"{WIDTHS[0]:g}in to {WIDTHS[1]:g}in, as 88mm, 8.8cm or 3.5in")
+            raise BadRequest("--width", width, f"{WIDTHS[0]:g}in to {WIDTHS[1]:g}in, as 88mm, 8.8cm or 3.5in")
     if font is not None:
         name, points = re.fullmatch(r"(.*?)(?:(?:^| +)(\d+\.?\d*) *pt)?", font.strip(), re.ASCII).groups()  # type: ignore[union-attr]
         size = None if points is None else float(points)
         if size is not None and not TEXTS[0] <= size <= TEXTS[1]:
-            raise BadRequest("font of a figure", font, f"a name, a size of {TEXTS[0]:g}pt to {TEXTS[1]:g}pt, or both")
+            raise BadRequest("--font", font, f"a name, a size of {TEXTS[0]:g}pt to {TEXTS[1]:g}pt, or both")
         font = require_font(name)
     made = Paper(ending, inches, size, font)
     if inches is not None and made.room < LEAST:
         points = size or PRINTED
         most, least = np.floor(10 * inches * USUAL / LEAST) / 10, np.ceil(25.4 * LEAST * points / USUAL)
         raise BadRequest(
-            f"text does not fit a figure {width} wide",
-            f"{points:g}pt",
-            f"--font of up to {most:g}pt, or a width of {least:.0f}mm and more",
+            f"--width {width}: text of {points:g}pt does not fit",
+            remedy=f"Set --font to at most {most:g}pt, or --width to at least {least:.0f}mm.",
         )
     return made
 
@@ -112,7 +111,7 @@ def require_font(name: str) -> str | None:
     known = {each.name for each in font_manager.fontManager.ttflist}
     if name and name not in known and name not in ("serif", "sans-serif", "monospace"):
         close = difflib.get_close_matches(name, known, 3, 0.4)
-        raise BadRequest("font of a figure", name, ", ".join(["an installed font", *close, "serif, sans-serif"]))
+        raise BadRequest("--font: font not found", name, ", ".join(["an installed font", *close, "serif, sans-serif"]))
     return name or None
 
 
