@@ -164,7 +164,7 @@ def test_sets_that_see_less_at_zero_are_told(robot: str, singular: str) -> None:
     assert chosen.verdict == CONTROLLABLE
     assert chosen.rank_at_zero == chosen.dof - 1
     said = " ".join(hrsynth.text(answer).split())
-    assert "lower rank at the zero configuration, a Type 2 singularity with these sets" in said
+    assert "a Type 2 singularity with these sets" in said
     assert f"{{{singular.replace(',', ', ')}}} ({chosen.dof - 1} of {chosen.dof})" in said
     assert "lower rank at" not in hrsynth.text(found(robot))
 

@@ -163,7 +163,7 @@ def test_show_draws_and_writes_a_robot(run, tmp_path: Path):
     for line in (
         r"3\(Rz\*-Rz-Rz\)   3-R\*RR",
         r"legs 1, 2, 3  base ── Rz\* ── Rz ══ Rz ── platform",
-        r"dof +3, 2T1R \(mobility 3, of which 0 idle\)",
+        r"dof +3, 2T1R \(mobility 3, of which 0 internal\)",
         r"verdict +controllable \(rank 3 of 3\)",
         r"exact +proved",
         r"legs needed +\{1, 2, 3\}",

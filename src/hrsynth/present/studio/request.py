@@ -60,7 +60,7 @@ class Request(Value):
     uploads: Path | None = None
     given: Mapping[str, Any] | None = None
 
-    # Fields of any question
+    # Fields of any request
 
     def flag(self, name: str) -> bool:
         """Return a truth value, False by default."""
@@ -155,7 +155,7 @@ class Request(Value):
     def seeing(self) -> ObservedRobot:
         """Return the observed robot; raise ``BadRequest`` if no leg is observed."""
         if self.blind:
-            raise BadRequest("watch: no leg is observed", remedy="Observe at least one leg.")
+            raise BadRequest("no leg is observed", remedy="Observe at least one leg.")
         return self.setup
 
     @cached_property
