@@ -414,21 +414,19 @@ def all_of(found: AssemblyModes) -> str:
 def proof_words(mode: AssemblyMode) -> str:
     """Describe the enclosure of a mode, or why it has none."""
     within = (
-        ""
-        if not np.isfinite(mode.radius)
-        else f"to {mode.shift:.1e} m" + (f", {mode.turn:.1e} rad" if mode.turn else "")
+        "" if not np.isfinite(mode.radius) else f"{mode.shift:.1e} m" + (f", {mode.turn:.1e} rad" if mode.turn else "")
     )
-    known = f"known {within}" if within else "radius unknown"
+    known = f"known to {within}" if within else "radius unknown"
     if mode.proved:
-        return f"{', '.join(mode.enclosed)}{' ' if mode.enclosed else ''}enclosed {within}"
+        return f"enclosure {within}".rstrip() + (f" ({', '.join(mode.enclosed)})" if mode.enclosed else "")
     if mode.match_residual is not None and mode.goal:
         return f"a mode by construction, pose not proved, {known}"
     if mode.match_residual is not None:
         return f"matches all legs to {mode.match_residual:.1e}, which does not prove it; if it is a mode, {known}"
     if mode.rounded:
-        return f"not proved: enclosed {within} for the rounded geometry, not for the file's".replace("  ", " ")
+        return f"not proved: enclosure {within} of the rounded geometry, not of the file's".replace("  ", " ")
     if mode.multiplicity > 1:
-        return f"not proved, a singular solution {within}".rstrip()
+        return f"not proved, a singular solution, {known}"
     return f"{'a mode by construction, pose ' if mode.goal else ''}not proved, {known}"
 
 
