@@ -32,7 +32,7 @@ class RunOutcome(Value):
     """Outcome of a run and its reason; ``matched`` is the number of the assembly mode, counted from 1 in the list of
     all modes of the goal's directions (None if it is none of them, or if they cannot be listed)."""
 
-    name: Annotated[str, As("ended")]
+    name: Annotated[str, As("outcome")]
     reason: Recorded[str]
     matched: Annotated[int | None, As("matched_mode")] = None
     modes: AssemblyModes | None = None
