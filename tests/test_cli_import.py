@@ -78,7 +78,7 @@ def talk(folder: Path, arguments: list[str], answers: list[str]) -> tuple[int, s
 
 def repeated(shown: str, folder: Path) -> None:
     """Run the command that was printed."""
-    words = shlex.split(shown.rpartition("without questions: ")[2].strip().splitlines()[0])
+    words = shlex.split(shown.rpartition("without dialog: ")[2].strip().splitlines()[0])
     assert words[0] == "hrsynth"
     subprocess.run(
         [sys.executable, "-m", *words], cwd=folder, check=True, capture_output=True, stdin=subprocess.DEVNULL
@@ -114,7 +114,7 @@ def test_giving_up_writes_nothing(answers: list[str], status: int, tmp_path: Pat
     save(load("3rps"), tmp_path / "robot.sdf")
     found, shown = talk(tmp_path, ["import", "robot.sdf", "-o", "out.urdf"], answers)
     assert found == status, shown
-    assert "nothing is written" in shown
+    assert "nothing written" in shown
     assert "Traceback" not in shown
     assert [path.name for path in tmp_path.iterdir()] == ["robot.sdf"]
 
@@ -161,7 +161,7 @@ def test_without_a_terminal_guesses_are_taken_and_told(ending: str, tmp_path: Pa
     out, err = capsys.readouterr()
     assert ("guess: the platform" in err) is (ending == ".xml")
     written = Path("out.urdf").read_bytes()
-    assert execute(shlex.split(out.rpartition("questions: ")[2])[1:]) == 0
+    assert execute(shlex.split(out.rpartition("dialog: ")[2])[1:]) == 0
     assert Path("out.urdf").read_bytes() == written
     robot, back = load("3rps"), load("out.urdf")
     assert (back.base, back.platform) == (robot.base, robot.platform)
@@ -185,9 +185,9 @@ def test_a_robot_without_motors_is_told(tmp_path: Path, capsys, monkeypatch):
             *["--motors", motors] * bool(motors),
         ]
         assert execute(asked) == 0
-        assert ("no joint is driven" in capsys.readouterr().err) is told
+        assert ("no joint is actuated" in capsys.readouterr().err) is told
         assert execute([*asked, "--json"]) == 0
-        assert any("no joint is driven" in note for note in json.loads(capsys.readouterr().out)["notes"]) is told
+        assert any("no joint is actuated" in note for note in json.loads(capsys.readouterr().out)["notes"]) is told
 
 
 def test_its_record_holds_the_command(tmp_path: Path, capsys, monkeypatch):

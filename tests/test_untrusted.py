@@ -79,10 +79,10 @@ def test_gzip_is_inflated_up_to_the_limit():
     assert untrusted.gunzip(gzip.compress(b"x" * 1000), "f", 1000) == b"x" * 1000
     assert untrusted.gunzip(one + b"\0" * 8, "f", 1000) == b"x" * 600
     for bomb in (gzip.compress(b"x" * 1001), one + one, gzip.compress(b"x" * 10**7)):
-        with pytest.raises(BadRequest, match="unpacks to: got 'more than 1000 bytes'"):
+        with pytest.raises(BadRequest, match="unpacks to more than 1000 bytes"):
             untrusted.gunzip(bomb, "f", 1000)
     for bad in (one[:-9], b"\x1f\x8bno", one + b"rest", gzip.compress(one)[:5]):
-        with pytest.raises(BadRequest, match="truncated, or not compressed"):
+        with pytest.raises(BadRequest, match="truncated or not gzip"):
             untrusted.gunzip(bad, "f", 1000)
 
 
@@ -224,10 +224,10 @@ def test_a_catalog_unpacks_to_no_more_than_is_allowed(line: bytes, count: int, c
 def test_a_program_that_reads_has_limits(tmp_path: Path):
     program = tmp_path / "program.py"
     for body, said in (
-        ("bytearray(10**10)", "more memory"),
+        ("bytearray(10**10)", "bytes of memory"),
         ("import sys; sys.stdout.write('x' * 10**7)", None),
-        ("import os; os.abort()", "breaks its reader"),
-        ("while True: pass", "memory or time|did not finish"),
+        ("import os; os.abort()", "reader crashed"),
+        ("while True: pass", "memory or time|not read within"),
         ("from hrsynth.untrusted import refuse; refuse('a\\nb')", "a b"),
     ):
         program.write_text(f"def main():\n    {body}\n")
@@ -606,7 +606,7 @@ def test_a_certificate_file_is_checked_within_limits(tmp_path: Path, monkeypatch
     monkeypatch.setattr(certificates_, "VERIFY_SECONDS", 1)
     for body, status, said in (
         ("while True: pass", 3, "memory or time"),
-        ("bytearray(10**10)", 3, "more memory"),
+        ("bytearray(10**10)", 3, "bytes of memory"),
         ("print('accepted: rank')", 0, "rank"),
         ("print('refused: a: b')", 3, "a: b"),
     ):
