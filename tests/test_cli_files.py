@@ -241,7 +241,7 @@ def test_an_output_that_takes_nothing_is_told_in_one_line():
             done = subprocess.run(program, stdout=full, stderr=subprocess.PIPE, text=True)
         assert (done.returncode, done.stderr) == (
             2,
-            "hrsynth: cannot write to standard output: No space left on device\n",
+            "hrsynth: cannot write to standard output: No space left on device. Free space, or write elsewhere.\n",
         )
     closed = subprocess.run(["sh", "-c", 'exec "$@" >&-', "sh", *program], stderr=subprocess.PIPE, text=True)
     assert (closed.returncode, closed.stderr) == (0, "")

@@ -78,7 +78,7 @@ def talk(folder: Path, arguments: list[str], answers: list[str]) -> tuple[int, s
 
 def repeated(shown: str, folder: Path) -> None:
     """Run the command that was printed."""
-    words = shlex.split(shown.rpartition("without questions: ")[2].strip().splitlines()[0])
+    words = shlex.split(shown.rpartition("without dialog: ")[2].strip().splitlines()[0])
     assert words[0] == "hrsynth"
     subprocess.run(
         [sys.executable, "-m", *words], cwd=folder, check=True, capture_output=True, stdin=subprocess.DEVNULL
@@ -114,7 +114,7 @@ def test_giving_up_writes_nothing(answers: list[str], status: int, tmp_path: Pat
     save(load("3rps"), tmp_path / "robot.sdf")
     found, shown = talk(tmp_path, ["import", "robot.sdf", "-o", "out.urdf"], answers)
     assert found == status, shown
-    assert "nothing is written" in shown
+    assert "nothing written" in shown
     assert "Traceback" not in shown
     assert [path.name for path in tmp_path.iterdir()] == ["robot.sdf"]
 

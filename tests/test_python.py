@@ -95,7 +95,7 @@ def test_a_wrong_keyword_is_told_with_the_nearest_and_all(ask: Any, near: str):
         (lambda: hrsynth.basins("rrrrr_m1", goal="x=0", steps=301), "^steps: got 301, .* at least 2, at most 300"),
         (lambda: hrsynth.basins("rrrrr_m1", goal="x=0", jobs=0), "^jobs: got 0, .* at least 1$"),
         (lambda: hrsynth.equilibria("rrrrr_m1", goal="x=0", max_boxes=0), "^max_boxes: got 0, .* at least 1$"),
-        (lambda: hrsynth.servo("rrrrr_m1", start="x=0", goal="x=0", gain=1e7), "^gain, .* at most 1e"),
+        (lambda: hrsynth.servo("rrrrr_m1", start="x=0", goal="x=0", gain=1e7), "^gain: .* at most 1e"),
         (lambda: hrsynth.select("rrrrr_m1", start="x=0", goal="x=0", examine=0), "^examine: got 0, .* at least 1$"),
         (lambda: hrsynth.draw(hrsynth.singularities("rrrrr_m1", points=5), steps=1), "^steps: got 1, .* at least 5"),
         (lambda: hrsynth.verify(None), "a file: expected its path"),
@@ -109,7 +109,7 @@ def test_a_wrong_keyword_is_told_with_the_nearest_and_all(ask: Any, near: str):
         (lambda: hrsynth.accuracy("rrrrr_m1", cone=0.01, grid=["x=0:0.1:2"]), "^a grid: got .*, expected a text"),
         (lambda: hrsynth.load("rrrrr_m1", motors=[1]), "^names: got .*, expected texts in"),  # type: ignore[list-item]
         (lambda: hrsynth.load("rrrrr_m1", motors=1), "^names: got 1, expected texts in a list"),
-        (lambda: hrsynth.load("rrrrr_m1", close=[("a", "b")]), "^names, found"),  # type: ignore[list-item]
+        (lambda: hrsynth.load("rrrrr_m1", close=[("a", "b")]), "^names: got"),  # type: ignore[list-item]
         (lambda: hrsynth.load("rrrrr_m1", tolerance="x"), "^tolerance: got 'x', expected 1e-11"),
         (lambda: hrsynth.studio(3, open_=False), "a robot's file: got 3"),
     ],

@@ -91,7 +91,7 @@ def run_program(program: Path, *arguments: str, seconds: int, given: str = "") -
             errors.seek(0)
             lines = errors.read(UNPACKED_MAX_BYTES).decode("utf-8", "replace").splitlines()
     except (subprocess.TimeoutExpired, ValueError):
-        raise BadRequest(f"not read within {seconds} s", remedy="Use a smaller file.") from None
+        raise BadRequest(f"not read within {seconds} s") from None
     except OSError as error:
         raise BadRequest(f"{tempfile.gettempdir()}: {error.strerror}", remedy="Set TMPDIR to another folder.") from None
     last = [line.removeprefix(REFUSED) for line in lines if line.startswith(REFUSED)]
