@@ -161,7 +161,7 @@ def test_without_a_terminal_guesses_are_taken_and_told(ending: str, tmp_path: Pa
     out, err = capsys.readouterr()
     assert ("assumption: the platform" in err) is (ending == ".xml")
     written = Path("out.urdf").read_bytes()
-    assert run_command(shlex.split(out.rpartition("questions: ")[2])[1:]) == 0
+    assert run_command(shlex.split(out.rpartition("dialog: ")[2])[1:]) == 0
     assert Path("out.urdf").read_bytes() == written
     robot, back = load("3rps"), load("out.urdf")
     assert (back.base, back.platform) == (robot.base, robot.platform)
@@ -185,9 +185,9 @@ def test_a_robot_without_motors_is_told(tmp_path: Path, capsys, monkeypatch):
             *["--motors", motors] * bool(motors),
         ]
         assert run_command(asked) == 0
-        assert ("no joint is driven" in capsys.readouterr().err) is told
+        assert ("no joint is actuated" in capsys.readouterr().err) is told
         assert run_command([*asked, "--json"]) == 0
-        assert any("no joint is driven" in note for note in json.loads(capsys.readouterr().out)["notes"]) is told
+        assert any("no joint is actuated" in note for note in json.loads(capsys.readouterr().out)["notes"]) is told
 
 
 def test_its_record_holds_the_command(tmp_path: Path, capsys, monkeypatch):

@@ -28,7 +28,7 @@ Given = dict[str, Any]
 
 
 def map_robots(
-    observation_model: str | Callable[..., Any],
+    analysis: str | Callable[..., Any],
     robots: RobotLike | Iterable[RobotLike],
     *,
     poses: PoseLike | Iterable[PoseLike] | None = None,
@@ -41,7 +41,7 @@ def map_robots(
 
     Parameters
     ----------
-    observation_model
+    analysis
         Public function or its name, or your own function with the same parameters. It receives a pose as ``at``, or as
         ``goal`` without ``at``, and a set of legs as ``observe``.
     robots
@@ -74,7 +74,7 @@ def map_robots(
     >>> hrsynth.map_robots("check", ["3rrr_m1"], poses=["x=0,phi=0", "x=0.01,phi=0"], legs=["1,2", "all"], jobs=1)[0]
     <Check: 3rrr_m1, observing 1, 2: x=0,y=0,z=0,phi=0deg regular, observes 2 of 3 dof>
     """
-    function: Callable[..., Any] = _find_function(observation_model)
+    function: Callable[..., Any] = _find_function(analysis)
     if errors not in (RAISE, KEEP):
         raise BadRequest("errors", errors, (RAISE, KEEP))
     if jobs is not None and (isinstance(jobs, bool) or not isinstance(jobs, int) or jobs < 1):
@@ -110,17 +110,15 @@ def _read(given: RobotLike, errors: str) -> RobotLike:
         return given
 
 
-def _find_function(observation_model: str | Callable[..., Any]) -> Callable[..., Any]:
-    if callable(observation_model):
-        return observation_model
+def _find_function(analysis: str | Callable[..., Any]) -> Callable[..., Any]:
+    if callable(analysis):
+        return analysis
     try:
-        found = Result.public(observation_model)
+        found = Result.public(analysis)
     except (AttributeError, TypeError):
         found = None
     if not (callable(found) and "robot" in signature(found).parameters):
-        raise BadRequest(
-            "analysis", observation_model, "a function of hrsynth that takes a robot, or its name, such as check"
-        )
+        raise BadRequest("analysis", analysis, "a function of hrsynth that takes a robot, or its name, such as check")
     return found
 
 

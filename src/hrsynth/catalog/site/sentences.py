@@ -13,12 +13,12 @@ RULES = {
     "motors off": "The motors are set free: the controller moves what the camera measures, not the motors.",
     "lift": "A virtual chain that constrains nothing is added to {legs}; its actuated U joint measures the observed "
     "direction.",
-    "anchor locus": "In {legs} the point that carries this U joint moves on a surface or a curve, or is fixed, so that "
+    "centre locus": "In {legs} the point that carries this U joint moves on a surface or a curve, or is fixed, so that "
     "fewer virtual sliders carry it.",
     "direction locus": "In {legs} the observed direction rotates about one axis or not at all, so that one actuated R "
     "joint or none measures it.",
-    "takeover": "In {legs} the virtual actuator replaces the real joint before the observed segment.",
-    "companion": "In {legs} the rod parallel to the observed one moves with it.",
+    "joint substitution": "In {legs} the virtual actuator replaces the real joint before the observed segment.",
+    "rod transfer": "In {legs} the rod parallel to the observed one moves with it.",
     "end change": "In {legs} the last S joint becomes a U joint.",
     "pi form": "In {legs} a planar parallelogram (Π) carries the actuator, for it moves on a circle.",
     "prismatic merge": "In {legs} the virtual actuator replaces the real joint on the base.",
