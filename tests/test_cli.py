@@ -289,10 +289,10 @@ def test_a_file_that_cannot_be_written_is_told_before_any_work(
         pytest.fail("the work began")
 
     for module, work in (
-        ("cli.analyses", "robot_of"),
-        ("cli.files", "robot_of"),
+        ("cli.analyses", "load_robot"),
+        ("cli.files", "load_robot"),
         ("cli.importing", "_read"),
-        ("cli.catalog", "_of_word"),
+        ("cli.catalog", "_find_shown"),
         ("linting.lint", "LintedFile"),
     ):
         monkeypatch.setattr(import_module(f"hrsynth.{module}"), work, worked)

@@ -199,7 +199,7 @@ def test_parallel_rails_need_one_rail_or_one_line(robot: str) -> None:
     assert singles(answer, "encoder") == rails
     assert singles(answer, "line") == {o.link for o in setup.observed}
     assert len(answer.sets) == len(answer.setup.observed) * 2
-    assert all(m.is_actuated for each in answer.sets for m in each.measurements if m.kind == "encoder")
+    assert all(m.actuated for each in answer.sets for m in each.measurements if m.kind == "encoder")
 
 
 @pytest.mark.some(1)
@@ -361,9 +361,7 @@ def test_in_small_batches_too(monkeypatch: pytest.MonkeyPatch, robot: str, obser
 def test_motors_come_first(robot: str) -> None:
     """Legs, directions, lines, then encoders, those on joints with motors before the others."""
     all_samples = list_candidates(setting_of(robot, ("1",)))
-    order = [
-        ("leg", "direction", "line", "encoder").index(each.kind) - bool(each.is_actuated) / 2 for each in all_samples
-    ]
+    order = [("leg", "direction", "line", "encoder").index(each.kind) - bool(each.actuated) / 2 for each in all_samples]
     assert order == sorted(order)
     assert "1" not in {each.of for each in all_samples if each.kind == "leg"}
 

@@ -108,7 +108,7 @@ def test_a_chain_constrains_nothing_and_sees_what_the_kind_sees(kind: type[Obser
     """Six freedoms, independent; its passive ones are the kernel of the rates; its motors are what is measured."""
     seen, X_c, X = far(rng, kind, side)
     chain, M = chain_of(seen, X_c, X), rates(seen, X_c, X)
-    whole, passive = twists(chain), twists(chain, lambda joint: not joint.is_actuated)
+    whole, passive = twists(chain), twists(chain, lambda joint: not joint.actuated)
     assert sum(FREEDOMS[joint.letter] for joint in chain) == 6
     assert np.linalg.svd(whole, compute_uv=False)[-1] > 1e-6
     assert np.max(np.abs(M @ passive), initial=0.0) < 1e-9 * (1 + np.abs(M).max()) * (1 + np.abs(passive).max())
@@ -125,7 +125,7 @@ def test_wrenches_are_reciprocal_to_what_moves_when_the_value_is_held(
     """And they are as many as are independent: they span the same space as the rates do."""
     seen, X_c, X = far(rng, kind, side)
     W = np.array(seen.wrenches(seen.sighting(X_c, X)), dtype=float)  # type: ignore[attr-defined]
-    passive = twists(chain_of(seen, X_c, X), lambda joint: not joint.is_actuated)
+    passive = twists(chain_of(seen, X_c, X), lambda joint: not joint.actuated)
     assert np.max(np.abs(W @ passive), initial=0.0) < 1e-9 * (1 + np.abs(W).max()) * (1 + np.abs(passive).max())
     M = rates(seen, X_c, X)
     rank = np.linalg.matrix_rank
@@ -213,7 +213,7 @@ def test_a_line_through_the_centre_has_a_chain_of_other_motors() -> None:
     seen = kind("p", "l", at=np.array([0, 0, 1.0]), axis=np.array([0, 0, 1.0]))  # type: ignore[call-arg]
     X_c, X = build_pose(), build_pose()
     chain = chain_of(seen, X_c, X)
-    passive = twists(chain, lambda joint: not joint.is_actuated)
+    passive = twists(chain, lambda joint: not joint.actuated)
     assert [joint.letter for joint in chain] == ["P", "P", "U", "C"]
     assert np.linalg.svd(twists(chain), compute_uv=False)[-1] > 1e-6
     assert np.max(np.abs(rates(seen, X_c, X) @ passive)) < 1e-12

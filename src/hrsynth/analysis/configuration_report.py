@@ -48,9 +48,9 @@ class SingularityReport(Value, all_recorded=True):
     singularity_indices: SingularityIndices | None
     unobserved: tuple[Freedom, ...] = ()
 
-    type1 = Shown(bool | None, lambda self: self.singularity_indices and self.singularity_indices.type1)
-    type2 = Shown(bool | None, lambda self: self.singularity_indices and self.singularity_indices.type2)
-    type3 = Shown(bool | None, lambda self: self.singularity_indices and self.singularity_indices.type3)
+    type1 = Shown(bool | None, lambda self: self.singularity_indices and self.singularity_indices.is_type1)
+    type2 = Shown(bool | None, lambda self: self.singularity_indices and self.singularity_indices.is_type2)
+    type3 = Shown(bool | None, lambda self: self.singularity_indices and self.singularity_indices.is_type3)
 
     @property
     def state(self) -> str:

@@ -44,7 +44,7 @@ Term = tuple[float, float]
 CODES = "LOAD", "ADD", "SUBTRACT", "MULTIPLY", "SCALE", "COPY", "SHIFT", "NEGATE", "INVERT", "ROOT", "SINES", "CONSTANT"
 LOAD, ADD, SUBTRACT, MULTIPLY, SCALE, COPY, SHIFT, NEGATE, INVERT, ROOT, SINES, CONSTANT = range(12)
 _NAMES = {"+": ADD, "-": SUBTRACT, "*": MULTIPLY, "sqrt": ROOT}
-_NUMBERS = "AFFINE_ROUNDING", "HALF_PI", "FARTHEST_TURN", "SINE_SERIES", "COSINE_SERIES"
+_NUMBERS = "AFFINE_ROUNDING", "HALF_PI", "EXACT_SINE_ANGLE_MAX_RAD", "SINE_SERIES", "COSINE_SERIES"
 _FUNCTIONS = (
     round_radius,
     spread,
@@ -65,7 +65,7 @@ from numba import njit
 
 compiled = njit(cache=True, nogil=True, error_model="numpy")
 {numbers}
-LANES = {lanes}
+TAPE_LANES_COUNT = {lanes}
 {codes} = range({count})
 
 
@@ -332,4 +332,4 @@ def _compile_machine() -> Callable[..., None]:
                 f"@compiled\n{inspect.getsource(each)}" for each in (*_FUNCTIONS, sum_sizes, run_instructions)
             ),
         ),
-    ).machine
+    ).run_instructions

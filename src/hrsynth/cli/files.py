@@ -13,7 +13,7 @@ from .options import JSON, SOURCE, load_robot, warn
 from .progress import Progress
 
 
-class ShippedRobot(TypedDict):
+class ShippedRobotRecord(TypedDict):
     """A robot; for a shipped one also its architecture, source and dimensions."""
 
     name: str
@@ -27,7 +27,7 @@ class ShippedRobot(TypedDict):
 class Robots(Head):
     """Robots that come with the package."""
 
-    robots: list[ShippedRobot]
+    robots: list[ShippedRobotRecord]
 
 
 class Convert(OfRobot):

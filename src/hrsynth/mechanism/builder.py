@@ -16,7 +16,7 @@ class Builder:
 
     >>> b = Builder("pendulum"); b.link("base"); b.link("bob", at=(0, 0, -1))
     >>> b.joint("hinge", "R", "base", "bob", at=(0, 0, 0), axis=(0, 1, 0), motor=True)
-    >>> b.build(platform="bob").joints["hinge"].actuated
+    >>> b.build(platform="bob").joints["hinge"].is_actuated
     True
     """
 

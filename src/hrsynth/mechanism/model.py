@@ -524,7 +524,7 @@ class Mechanism(Result, shown_as="robot"):
             compare(f"content of link {name}", self.links[name].xml, other.links[name].xml)
         for name in self.joints.keys() & other.joints.keys():
             a, b = self.joints[name], other.joints[name]
-            for what in ("type", "links", "limits", "actuated", "in_tree", "xml"):
+            for what in ("type", "links", "limits", "is_actuated", "in_tree", "xml"):
                 compare(f"{what} of joint {name}", getattr(a, what), getattr(b, what))
             near(f"centre of joint {name}", a.point, b.point)
             if len(a.axes) == len(b.axes):

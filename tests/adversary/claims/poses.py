@@ -66,7 +66,7 @@ def judge(case: Case, told: Any, asked: str) -> None:
         case.say("ranks there", UNCLEAR, "a measurement is no direction of a link")
         return
     dof, seen, clear = case.study.locals(at)[0].sees(np.asarray(case.study.rates(items, at)[0], dtype=float))
-    if not clear or not posture.decided:
+    if not clear or not posture.has_decided_ranks:
         case.say("ranks there", UNCLEAR, "singular values near the cutoff")
         return
     good = (posture.dof, posture.hidden.rank) == (dof, seen)

@@ -79,7 +79,7 @@ def test_poses_keep_their_points_in_the_planes():
     rng = np.random.default_rng(0)
     assert len(families()) == 2
     R = scenes.goal("3rps").pose("platform")[:3, :3]
-    assert [each.holds(R) for each in families()].count(True) == 1
+    assert [each.has_rotation(R) for each in families()].count(True) == 1
     for family in families():
         assert len(family.charts) == 6
         for error in family.charts:
@@ -89,7 +89,7 @@ def test_poses_keep_their_points_in_the_planes():
             tips = points(error.error.length * p, R)
             assert np.abs((tips * TANGENTS).sum(axis=2)).max() < 1e-9
             assert np.abs(at(error.closing, y)).max() < 1e-12
-            if not family.holds(scenes.goal("3rps").pose("platform")[:3, :3]):
+            if not family.has_rotation(scenes.goal("3rps").pose("platform")[:3, :3]):
                 assert np.abs(np.trace(R, axis1=1, axis2=2) + 1).max() < 1e-12
 
 
@@ -168,8 +168,8 @@ def test_where_closures_meet_a_slope_along_one_of_them_is_no_rest():
     p = np.array([0.0, 0.0, 0.3328])
     offsets = PLATFORM * np.einsum("ij,ij->i", WAYS @ R.T, TANGENTS)
     p[:2] = -np.linalg.lstsq(TANGENTS[:, :2], offsets, rcond=None)[0]
-    family = next(each for each in families() if each.holds(goal.pose("platform")[:3, :3]))
-    assert all(each.holds(R) for each in families())
+    family = next(each for each in families() if each.has_rotation(goal.pose("platform")[:3, :3]))
+    assert all(each.has_rotation(R) for each in families())
 
     def along(turn):
         """E on the goal's family, its turns about axes of the base's plane."""
@@ -179,7 +179,7 @@ def test_where_closures_meet_a_slope_along_one_of_them_is_no_rest():
         assert np.abs((way * TANGENTS).sum(axis=1)).max() < 1e-12
         return level(np.stack([(way * WAYS).sum(axis=1), way[:, 2]], axis=1))
 
-    assert family.holds(convert_vectors_to_rotations(3.0 * np.array([np.cos(axis), np.sin(axis), 0.0])))
+    assert family.has_rotation(convert_vectors_to_rotations(3.0 * np.array([np.cos(axis), np.sin(axis), 0.0])))
     assert abs(along(STEP) - along(-STEP)) / (2 * STEP) > 0.05
     u = rods(p, R) / np.linalg.norm(rods(p, R), axis=1)[:, None]
     none = np.zeros(1, dtype=np.intp)
