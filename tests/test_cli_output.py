@@ -173,8 +173,8 @@ for name in ("SIGHUP", "SIGCHLD", "SIGKILL", "SIGPIPE"):
     delattr(signal, name)
 for name in ("fork", "killpg", "setsid", "setpgid"):
     delattr(os, name)
-from hrsynth.cli import execute
-sys.exit(execute(sys.argv[1:]))
+from hrsynth.cli import run_command
+sys.exit(run_command(sys.argv[1:]))
 """
 
 

@@ -29,6 +29,8 @@ def test_options_come_back_from_the_index_as_they_are_declared(name: str):
 
 
 def test_help_loads_nothing_that_computes():
-    code = "import sys; from hrsynth.cli import execute; execute(['check', '-h']); print('numpy' in sys.modules)"
+    code = (
+        "import sys; from hrsynth.cli import run_command; run_command(['check', '-h']); print('numpy' in sys.modules)"
+    )
     shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert shown.endswith("False\n")

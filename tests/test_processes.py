@@ -24,9 +24,9 @@ COMMANDS = {
 CLI = """
 import sys
 import hrsynth.simulation.equilibria.subdivision as boxes
-from hrsynth.cli import execute
+from hrsynth.cli import run_command
 boxes.BOXES_ALONE, boxes.BOXES_A_PART = 1, 1000
-sys.exit(execute(sys.argv[1:]))
+sys.exit(run_command(sys.argv[1:]))
 """
 MAP = "import hrsynth; hrsynth.map_robots('check', ['quattro'], poses=['z=-0.7'] * 20_000, jobs=2)"
 END = 15.0

@@ -98,8 +98,8 @@ class Finder:
         if name.split(".")[0] in BLOCKED:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 sys.meta_path.insert(0, Finder())
-from hrsynth.cli import execute
-sys.exit(execute(sys.argv[1:]))
+from hrsynth.cli import run_command
+sys.exit(run_command(sys.argv[1:]))
 """
 
 

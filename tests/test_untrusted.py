@@ -671,7 +671,10 @@ def test_records_take_no_more_memory_than_is_allowed(ending: str, tmp_path: Path
     lines = [f'{{"key":"{i}","group":"planar","refused":"no","notation":"{"x" * i}"}}' for i in range(5)]
     (kept := store(tmp_path / f"planar{ending}")).journal("planar").remove()
     kept.write("planar", lines)
-    for module, name, enough in ((query, "CATALOG_JSON_PARTS_MAX", 35), (stores, "CATALOG_MAX_BYTES", sum(map(len, lines)))):
+    for module, name, enough in (
+        (query, "CATALOG_JSON_PARTS_MAX", 35),
+        (stores, "CATALOG_MAX_BYTES", sum(map(len, lines))),
+    ):
         with monkeypatch.context() as patch:
             patch.setattr(module, name, enough + 200 * (module is stores and not ending))
             assert len(list(query.load(kept.path))) == 5

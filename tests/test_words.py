@@ -198,7 +198,9 @@ def test_a_public_function_documents_what_it_takes_and_returns(name: str):
     function = getattr(hrsynth, name)
     doc = inspect.getdoc(function) or ""
     parts = dict(re.findall(r"^(\w+)\n-{3,}\n(.*?)(?=^\w+\n-{3,}\n|\Z)", doc, re.MULTILINE | re.DOTALL))
-    documented = set(re.findall(r"\w+", " ".join(re.findall(r"^\S.*$", parts.get("Parameters", ""), re.MULTILINE))))
+    section = parts.get("Parameters", "")
+    headings = " ".join(re.findall(r"^\S.*$", section, re.MULTILINE))
+    documented = set(re.findall(r"\w+", headings)) | set(re.findall(r"``(\w+)``", section))
     taken = {each for each in inspect.signature(function).parameters if each != "options"}
     assert taken - documented == set()
     assert "Returns" in parts or "Yields" in parts or inspect.signature(function).return_annotation in (None, "None")
@@ -211,7 +213,7 @@ def test_subjects_of_commits_name_an_area_and_what_is_done():
     if done.returncode:
         pytest.skip("no history here")
     subjects = done.stdout.splitlines()
-    assert [each for each in subjects if len(each) > 60 or not re.match(r"[a-z_.]+: [a-z]", each)] == []
+    assert [each for each in subjects if len(each) > 60 or not re.match(r"[a-z_., ]+: \w", each)] == []
 
 
 def lower() -> None:

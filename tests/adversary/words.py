@@ -16,7 +16,7 @@ def listed(group: str) -> tuple[str, ...]:
     from hrsynth.catalog import load
 
     stored = load(Path(__file__).resolve().parents[2] / "catalog", group=group)
-    return tuple(record["word"] for record in stored if "refused" not in record)
+    return tuple(record["key"] for record in stored if "refused" not in record)
 
 
 def write(group: str, rng: np.random.Generator, path: Path) -> str:

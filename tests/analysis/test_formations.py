@@ -467,5 +467,5 @@ def test_the_certificate_of_ranks_holds():
     """[A; X] is six rows a body; a checker that knows nothing of formations counts what is seen."""
     found = complete("free", 3)
     record = json.loads(json.dumps(certificate(found)))
-    assert "11 of 18 freedoms" in verify(record)
+    assert "11 of 18 dof" in verify(record)
     assert verify(record, found.robot)

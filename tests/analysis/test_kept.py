@@ -244,7 +244,7 @@ def test_one_sample_of_another_mode_is_seen() -> None:
     index = list(robot.links).index("platform")
     mixed = [state.copy() for state in states]
     mixed[-1][index] = turned[-1]
-    assert "operation modes: a relation of its geometry holds at zero and at 4 of 5" in recognised(robot, mixed).doubt
+    assert "operation modes: an incidence of its geometry holds at zero and at 4 of 5" in recognised(robot, mixed).doubt
 
 
 # --- nearly special geometry -------------------------------------------------------------------------------------

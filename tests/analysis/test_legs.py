@@ -365,4 +365,4 @@ def test_a_platform_without_freedom_is_not_called_controllable() -> None:
     assert "controllable" not in hrsynth.text(told)
     advice = hrsynth.advise(held_plate())
     assert advice.nothing_missing
-    assert "has no freedom" in hrsynth.text(advice)
+    assert "The platform cannot move" in hrsynth.text(advice)

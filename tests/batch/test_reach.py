@@ -487,7 +487,7 @@ def test_a_constraint_singularity_on_the_way_is_told() -> None:
         track_to_pose(
             all_samples.start, all_samples.observation_model, Pose.parse("x=0.18,y=0.31176914536239791,z=1.2")
         )
-    assert "more than 99.9 % of the way" in str(refused.value)
+    assert "more than 99.9 % of the path" in str(refused.value)
     assert "100 %" not in str(refused.value)
 
 

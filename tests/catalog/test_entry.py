@@ -175,8 +175,8 @@ def test_what_is_driven_changes_nothing_else():
 def test_fifty_entries_are_the_same_in_another_process(part: int):
     chosen = random.Random(11).sample([word for name in GROUPS for word in words(name)], 50)[part::10]
     code = (
-        "import json, sys; from hrsynth.catalog.entry import entry; "
-        "[print(json.dumps(entry(line.strip()), sort_keys=True)) for line in sys.stdin]"
+        "import json, sys; from hrsynth.catalog.entry import build_entry; "
+        "[print(json.dumps(build_entry(line.strip()), sort_keys=True)) for line in sys.stdin]"
     )
     there = subprocess.run(
         [sys.executable, "-c", code], input="\n".join(reversed(chosen)), text=True, capture_output=True, check=True

@@ -361,5 +361,5 @@ def test_equal_parallel_rods_do_not_turn_their_plate(rods: int, seed: int) -> No
 def test_walks_that_lead_nowhere_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     all_samples = setting_of("3rrr_m1").all_samples
     monkeypatch.setattr(_Walks, "walk", lambda walks, roots: [])
-    with pytest.raises(SamplingFailure, match=r"of 20 random walks .* only 0 .* needed: 5; .*--at POSE"):
+    with pytest.raises(SamplingFailure, match=r": 0 samples from 20 random walks, 5 needed: .*--at POSE"):
         sample(all_samples.model, all_samples.observation_model, 5)

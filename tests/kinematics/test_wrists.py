@@ -191,7 +191,7 @@ def test_a_way_ends_where_the_three_axes_turn_no_further(seed: int) -> None:
             assert three_angles(axes, turn_of_tip(there)) is not None
         else:
             assert here.wrist == name
-            assert f"joint {name}, which stands for several R" in str(here)
+            assert f"joint {name}, which replaces several R" in str(here)
         count[isinstance(here, ClosedConfiguration)] += 1
     assert min(count.values()) > 0
 
@@ -209,4 +209,4 @@ def test_check_says_where_three_axes_lie_in_a_plane(apart: float) -> None:
     (posture,) = found.postures
     assert not posture.beyond_limits
     assert posture.singular_spherical_joints == ({"tip_1__1": pytest.approx(apart, abs=1e-9)} if apart < 0.01 else {})
-    assert ("in two ways: not counted" in str(found)) is (apart < 0.01)
+    assert ("about two axes only; not counted" in str(found)) is (apart < 0.01)

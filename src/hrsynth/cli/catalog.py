@@ -310,7 +310,8 @@ def _require_known(kept: str | None, asked: dict[str, Any]) -> None:
         close = get_close_matches(asked["text"].casefold(), near, cutoff=0.5)
         raise BadRequest(
             f"--text {asked['text']}: not found in any field or name of the catalog",
-            remedy=f"Search for another text, such as {' or '.join([near[name] for name in close] or _list_names()[:3])}.",
+            remedy="Search for another text, such as "
+            f"{' or '.join([near[name] for name in close] or _list_names()[:3])}.",
         )
 
 

@@ -103,7 +103,8 @@ class Progress:
         if self._done > before:
             left = _format_clock((now - began) * (self._total - self._done) / (self._done - before))
         full = PROGRESS_BAR_COLUMNS_COUNT * self._done // self._total
-        return f"{self._what} {'━' * full}{'─' * (PROGRESS_BAR_COLUMNS_COUNT - full)} {self._done}/{self._total} {left} left"
+        bar = "━" * full + "─" * (PROGRESS_BAR_COLUMNS_COUNT - full)
+        return f"{self._what} {bar} {self._done}/{self._total} {left} left"
 
 
 def _format_clock(seconds: float) -> str:

@@ -207,7 +207,10 @@ def _explain_no_translation(pattern: ConstraintPattern) -> str | None:
             reasons.append(f"normal to the {axis.meaning}")
     if not rows or np.linalg.svd(np.vstack(rows), compute_uv=False)[2:].sum() <= RELATION_ANGLE_TOL:
         return None
-    return f"a translation that all locked legs allow would be {_join_words(reasons)}; these are constant, and there is none"
+    return (
+        f"a translation that all locked legs allow would be {_join_words(reasons)}; "
+        "these are constant, and there is none"
+    )
 
 
 def _derive_planar(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Condition:
@@ -249,8 +252,8 @@ def _derive_bodies(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Co
     slide = make_vector(_make_symbol(pattern.slide))
     expression = det(*(make_vector(_make_symbol(leg.line)) for leg in lines), slide)
     words = (
-        f"{_describe_features(leg.line for leg in lines)} and the direction {slide}, in which the platform's halves move "
-        "on each other, are parallel to one plane"
+        f"{_describe_features(leg.line for leg in lines)} and the direction {slide}, "
+        "in which the platform's halves move on each other, are parallel to one plane"
     )
     return _name_condition(pattern, words, expression, True)
 

@@ -54,8 +54,15 @@ GIVEN, NOWHERE = "the given text", "(nowhere, as no file is given)"
 
 
 def list_robots() -> dict[str, Path]:
-    """Return the robots of the package: name to file, sorted by name.
+    """List the robots of the package.
 
+    Returns
+    -------
+    dict
+        Name to file, sorted by name.
+
+    Examples
+    --------
     >>> "3rrr_m1" in hrsynth.list_robots()
     True
     """

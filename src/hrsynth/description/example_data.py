@@ -11,9 +11,15 @@ FOLDER = f"cmeel.prefix/share/{PACKAGE}/robots"
 
 
 def list_examples() -> dict[str, Path]:
-    """Return the robots of example-robot-data: name to file, sorted by name. Files of one name get the folder's name
-    before theirs.
+    """List the robots of example-robot-data.
 
+    Returns
+    -------
+    dict
+        Name to file, sorted by name; files of one name get the folder's name before theirs.
+
+    Examples
+    --------
     >>> robots = hrsynth.list_examples()
     """
     from importlib.metadata import distribution

@@ -270,10 +270,10 @@ def bound_sine(value: Numbers, rate: Numbers, r: Numbers, w: Numbers, bent: bool
 
 
 def reduce_sines(x: Numbers) -> tuple[Numbers, Numbers]:
-    """Sine and cosine of angles up to ``EXACT_SINE_ANGLE_MAX_RAD``, each within 2⁻⁵⁰: the angle less whole quarters k of a turn,
-    the first part of π/2 exactly and each of the others with one rounding (2⁻⁵⁴), then Taylor's series, which are off
-    by 10⁻¹⁹, with a dozen roundings of numbers below 1 of which the last three count (W. J. Cody, W. Waite, Software
-    Manual for the Elementary Functions, 1980, chapter 8)."""
+    """Sine and cosine of angles up to ``EXACT_SINE_ANGLE_MAX_RAD``, each within 2⁻⁵⁰: the angle less whole quarters k
+    of a turn, the first part of π/2 exactly and each of the others with one rounding (2⁻⁵⁴), then Taylor's series,
+    which are off by 10⁻¹⁹, with a dozen roundings of numbers below 1 of which the last three count (W. J. Cody, W.
+    Waite, Software Manual for the Elementary Functions, 1980, chapter 8)."""
     k = np.rint(x / HALF_PI[0])
     y = ((x - k * HALF_PI[0]) - k * HALF_PI[1]) - k * HALF_PI[2]
     z = y * y

@@ -27,7 +27,9 @@ def test_a_system_that_needs_more_is_not_started():
     robot = load(list_robots()["hexa"])
     confined = hrsynth.modes(robot, real=True).confined
     assert confined is not None
-    with pytest.raises(TooLarge, match=r"6 legs and 6 dof, needs about 0\.4 s, more than the effort of 0\.1 s"):
+    with pytest.raises(
+        TooLarge, match=r"6 legs and 6 dof, needs about 0\.4 s, more than the time limit of 0\.1 s\. Raise --time-limit"
+    ):
         solve_all(confined, time_limit=0.1)
 
 

@@ -260,5 +260,5 @@ def test_the_right_condition_passes_again() -> None:
 def test_a_robot_without_motors_has_no_real_condition() -> None:
     robot = load("3rrr_m1")
     still = replace(robot, joints={name: replace(joint, motor=None) for name, joint in robot.joints.items()})
-    with pytest.raises(BadRequest, match="has no motor"):
+    with pytest.raises(BadRequest, match=r"3rrr_m1: no motor\. Name one or more with --motors"):
         singularities(still, real=True, points=1)

@@ -107,7 +107,7 @@ def test_what_is_not_found_is_not_said_not_to_be():
     answer = found("quattro_rigid", "1,3")
     assert answer.checked is not None
     text = format_singularity(replace(answer, examples=()))
-    assert f"not found by {answer.checked.searches} searches, which does not mean that there are none" in text
+    assert f"none found by {answer.checked.searches} searches, which does not exclude any" in text
     assert "no pose" not in text
 
 

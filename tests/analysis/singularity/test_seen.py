@@ -103,7 +103,7 @@ def test_a_platform_that_translates_has_a_condition_of_all_kinds(sensor: list[st
 def test_points_on_one_line() -> None:
     found = seen("point:platform@0.1,0,0", "point:platform@0.2,0,0", "point:platform@0.4,0,0")
     assert found.always
-    assert found.words.endswith("because B1, B2, B3 are on one line, about which the platform can turn")
+    assert found.words.endswith("because B1, B2, B3 are on one line, about which the platform can rotate")
 
 
 @pytest.mark.parametrize(

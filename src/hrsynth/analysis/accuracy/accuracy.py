@@ -182,7 +182,7 @@ def accuracy(
         Half-angle of the cones about the directions (rad, or text with ``deg``), for all or one per leg.
     noise
         Largest errors of other observations (also of directions without a cone), such as ``0.3px,1mm,0.1deg``.
-    at, plane, grid
+    at, plane, grid, steps
         Poses (m, rad, base coordinates): single ones; a plane, as far as it is reached, with ``steps`` poses a side; or
         a grid. Default: the zero configuration. Free parts of a grid keep their values at the zero configuration if
         every leg is a known subproblem.

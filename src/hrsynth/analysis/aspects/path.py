@@ -371,8 +371,8 @@ class PathPlanner(Value):
                     boxes=1 + len(across),
                     goal_modes=across,
                     reason=(
-                        f"the expression is enclosed with opposite signs at the two {_describe_ends(answer.any_mode)}: every "
-                        f"path between them {answer.where}crosses its zeros{forms}"
+                        f"the expression is enclosed with opposite signs at the two {_describe_ends(answer.any_mode)}: "
+                        f"every path between them {answer.where}crosses its zeros{forms}"
                     ),
                 )
             return self._lead_to_other_modes(answer, enclosures[0], others, (p, R), seed, budget)

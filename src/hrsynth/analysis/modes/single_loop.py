@@ -358,7 +358,8 @@ def _zeros(linear: _Linear) -> SystemModes | None:
     kept = [each for each in told if each is at_goal[0] or not each[1]]
     modes = [_mode(linear.loop, each[0], each is at_goal[0]) for each in kept]
     proof = (
-        f"{SINGLE_LOOP_JOINTS_MAX} free joints of one loop: at most {len(sure)} solutions by the degree of a determinant, "
+        f"{SINGLE_LOOP_JOINTS_MAX} free joints of one loop: "
+        f"at most {len(sure)} solutions by the degree of a determinant, "
         f"{len(sure)} zeros enclosed, all distinct, complex ones too, {len(told)} real"
     )
     out = [as_mode(linear.loop, box, False) for box, excluded in told if (box, excluded) not in kept]

@@ -459,7 +459,8 @@ def _proof(system: System, roots: SolutionSet) -> str:
     if roots.extraneous:
         text += f" (besides {roots.extraneous} roots at infinity, which are not poses)"
     if roots.far:
-        text += f" (besides {roots.far} beyond {SOLUTION_DISTANCE_MAX:g} characteristic lengths: at infinity, up to rounding)"
+        beyond = f"{roots.far} beyond {SOLUTION_DISTANCE_MAX:g} characteristic lengths"
+        text += f" (besides {beyond}: at infinity, up to rounding)"
     text += f", {roots.complex} {'root' if roots.complex == 1 else 'roots'} isolated"
     if roots.real:
         thin = sum(root.unique and not root.thick for root in roots.real)
@@ -487,6 +488,6 @@ def _special(roots: SolutionSet) -> str | None:
     if any(root.multiplicity > 1 for root in roots.real):
         return "a double solution: a singular pose"
     return (
-        f"two solutions differ by only {roots.closest:.1e} (limit for distinct poses: {DOUBLE_SOLUTION_DISTANCE_TOL:g}): "
-        "a singular pose, to rounding"
+        f"two solutions differ by only {roots.closest:.1e} "
+        f"(limit for distinct poses: {DOUBLE_SOLUTION_DISTANCE_TOL:g}): a singular pose, to rounding"
     )

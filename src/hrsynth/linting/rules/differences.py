@@ -190,7 +190,8 @@ def _compare_limits(file: LintedFile) -> Iterator[RuleHit]:
         ):
             yield RuleHit(
                 mine.line,
-                f"joint {_describe_names(mine, theirs)}: limits {_format_range(here)} here, {_format_range(there)} there",
+                f"joint {_describe_names(mine, theirs)}: "
+                f"limits {_format_range(here)} here, {_format_range(there)} there",
             )
 
 

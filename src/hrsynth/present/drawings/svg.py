@@ -30,7 +30,8 @@ def format_coordinate(value: float) -> str:
 def format_attributes(**values: object) -> str:
     """``stroke_width=2`` as `` stroke-width="2"``; None is left out."""
     return "".join(
-        f" {name.rstrip('_').replace('_', '-')}={quoteattr(format_coordinate(value) if isinstance(value, float) else str(value))}"
+        f" {name.rstrip('_').replace('_', '-')}="
+        f"{quoteattr(format_coordinate(value) if isinstance(value, float) else str(value))}"
         for name, value in values.items()
         if value is not None
     )
@@ -63,7 +64,8 @@ def format_drawing(width: float, height: float, name: str, description: str, *co
     """A whole drawing, on its own or inside a page."""
     return name_steering(
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {format_coordinate(width)} {format_coordinate(height)}" '
-        f'width="{format_coordinate(width)}" height="{format_coordinate(height)}" role="img" aria-label={quoteattr(name)} '
+        f'width="{format_coordinate(width)}" height="{format_coordinate(height)}" role="img" '
+        f"aria-label={quoteattr(name)} "
         f'font-family="{FONT}" font-size="12">{format_title(name)}{format_element("desc", escape(description))}'
         f"{''.join(content)}</svg>\n"
     )

@@ -30,7 +30,8 @@ def format_entries(records: Sequence[Record], total: int, groups: Sequence[str] 
         if names
     )
     if len(records) > CATALOG_ENTRIES_PRINTED_MAX:
-        count += f", the first {CATALOG_ENTRIES_PRINTED_MAX} shown (--json lists all; --legs, --motion, --verdict … restrict the list)"
+        count += f", the first {CATALOG_ENTRIES_PRINTED_MAX} shown"
+        count += " (--json lists all; --legs, --motion, --verdict … restrict the list)"
     return (
         f"{format_table([_format_row(record) for record in records[:CATALOG_ENTRIES_PRINTED_MAX]], HEADS)}\n\n{count}"
         if records

@@ -183,7 +183,8 @@ def _format_configuration(posture: ConfigurationReport, length: float, setup: Ob
             rows.append(
                 (
                     "",
-                    f"nearly singular: not distinguishable from a singularity with dimensions known to {INCIDENCE_TOL:g}",
+                    "nearly singular: not distinguishable from a singularity "
+                    f"with dimensions known to {INCIDENCE_TOL:g}",
                 )
             )
     elif far.type2 is None:

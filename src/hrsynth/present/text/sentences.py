@@ -57,8 +57,8 @@ def describe_seen(verdict: Verdict, labels: Sequence[str], setup: ObservedRobot)
     if (bodies := verdict.formation) is not None:
         rest = "".join(f"; {each.name}" for each in bodies.flexes) or "; nothing else"
         return (
-            f"Observing {_join_labels(labels, name_set_members(setup))} shows {verdict.rank} of the {verdict.dof} dof of the links. "
-            f"Unobserved: {', '.join(bodies.trivial) or 'no trivial motion'}{rest}."
+            f"Observing {_join_labels(labels, name_set_members(setup))} shows {verdict.rank} of the "
+            f"{verdict.dof} dof of the links. Unobserved: {', '.join(bodies.trivial) or 'no trivial motion'}{rest}."
         )
     unseen = verdict.named if verdict.unobserved else ""
     return describe_observation(labels, name_set_members(setup), verdict.rank, verdict.dof, unseen)

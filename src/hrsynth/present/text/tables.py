@@ -128,7 +128,8 @@ def format_head_rows(found: ObservedRobot) -> Rows:
 
 def label_of(observation: Observation) -> str:
     """Return the label of an observation, with its kind."""
-    return f"{observation.leg} ({observation.link if observation.is_segment_direction else describe_observation(observation)})"
+    what = observation.link if observation.is_segment_direction else describe_observation(observation)
+    return f"{observation.leg} ({what})"
 
 
 def describe_observation(observation: Observation) -> str:

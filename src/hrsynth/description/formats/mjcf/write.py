@@ -141,7 +141,8 @@ def _build_closure(robot: Mechanism, joint: Joint) -> list[xml.Element]:
     one, two = joint.links
     if joint.type is JointType.FIXED:
         relative = invert_pose(robot.links[one].pose) @ robot.links[two].pose
-        relpose = f"{_format_point(robot, one, joint.point)} {numerals.format_exact_vector(convert_to_quaternions(relative[:3, :3]))}"
+        turn = numerals.format_exact_vector(convert_to_quaternions(relative[:3, :3]))
+        relpose = f"{_format_point(robot, one, joint.point)} {turn}"
         return [
             xml.create_element(
                 "weld",
