@@ -443,11 +443,11 @@ def test_a_hidden_robot_of_one_leg_is_a_robot_again(run, tmp_path: Path, robot: 
 @pytest.mark.parametrize(
     ("arguments", "cure"),
     [
-        (["nowhere.urdf"], "the path of a file"),
+        (["nowhere.urdf"], "the path of an existing file"),
         (["empty.urdf"], "a robot file"),
-        (["cut.urdf"], "a whole document"),
+        (["cut.urdf"], "a whole XML document"),
         (["/dev/null"], "a robot file"),
-        (["delta", "-o", "nowhere/x.urdf"], "in a folder that is there"),
+        (["delta", "-o", "nowhere/x.urdf"], "a file in an existing folder"),
         (["delta", "--camera", "arm_1", "--camera", "base"], "others as NAME=LINK@x,y,z"),
         (["delta", "--unit", ""], "m, mm, cm, in"),
         (["delta", "--platform", ""], "rod_1a"),
@@ -795,7 +795,7 @@ def test_singular_json_where_a_freedom_is_always_lost(run):
     data = run("singularities", "uranesx", "--json").data
     check_record(data, "singularities", "uranesx")
     assert data["always"] is True
-    assert data["words"].startswith("always: 1 of 3 freedoms is never seen: translation along z")
+    assert data["words"].startswith("always: 1 of 3 dof never observed: translation along z")
     assert (data["expression"], data["verdict"]) == ("0", "partially controllable")
     assert data["checked"] == {"points": 0, "disagreements": 0}
 
@@ -867,10 +867,10 @@ def test_singular_refuses_in_one_line_and_writes_nothing(
         (
             ["--plane", "phi=0,x=0"],
             2,
-            ["this one leaves y", "fewer parts held", "--grid y=-0.1:0.1:9 of check, accuracy"],
+            ["must be free, here y.", "fewer fixed parts", "--grid y=-0.1:0.1:9 of check, accuracy"],
         ),
         (["--plane", "x=9"], 3, ["no pose of the plane x=9 is reached"]),
-        (["--observe", "1"], 2, ["has no locus", "legs that make it controllable"]),
+        (["--observe", "1"], 2, ["has no singularity locus", "legs that make it controllable"]),
     ],
 )
 def test_singular_refuses_a_plane_before_it_computes(
@@ -892,7 +892,7 @@ def test_a_robot_of_one_freedom_has_no_plane(
     """Though its platform moves along x and along z: on a curve."""
     monkeypatch.chdir(tmp_path)
     (line,) = run(words[0], robot(FOUR_BAR), *words[1:]).refused()
-    assert "this one leaves x and z, which depend on each other" in line
+    assert "--plane: two parts of the pose of four_bar must be free, here x and z, which depend on each other" in line
     assert "--grid x=-0.1:0.1:9" in line
 
 
@@ -955,7 +955,7 @@ def test_path_text_has_the_verdict_the_path_and_what_is_not_proved(run):
         (["--start", "x=0", "--goal", "x=9"], 3, ["x=9", "is not reached"]),
         (["--start", "x=0", "--goal", "w=9"], 2, ["unknown part", "'w'"]),
         (["--start", "x=0", "--goal", "z=0.1"], 2, ["cannot change z"]),
-        (["--start", "x=0", "--goal", "x=0.01", "--observe", "7"], 2, ["no leg or link", "'7'"]),
+        (["--start", "x=0", "--goal", "x=0.01", "--observe", "7"], 2, ["unknown leg or link", "'7'"]),
         (["--start", "x=0"], 2, ["--goal"]),
         (["--start", "x=0", "--goal", "x=0", "--as-written", "--tolerance", "1e-3"], 2, ["Omit one"]),
     ],
@@ -1023,9 +1023,9 @@ def test_modes_text_numbers_them_and_says_what_is_proved(run):
     [
         (["3rrr_m1", "--at", "x=9"], 3, ["x=9", "is not reached"]),
         (["3rrr_m1", "--at", "w=9"], 2, ["unknown part", "'w'"]),
-        (["3rrr_m1", "--observe", "7"], 2, ["no leg or link", "'7'"]),
+        (["3rrr_m1", "--observe", "7"], 2, ["unknown leg or link", "'7'"]),
         (["3rrr_m1", "-o", "modes.txt"], 2, ["modes.txt", ".png"]),
-        (["3rrr_m1", "--real", "--observe", "1"], 2, ["motors are held", "one of the two"]),
+        (["3rrr_m1", "--real", "--observe", "1"], 2, ["--real: cannot be combined with --observe", "Omit one"]),
     ],
 )
 def test_modes_refuses_what_does_not_fit(run, arguments: list[str], status: int, words: list[str]):
@@ -1074,8 +1074,8 @@ def test_servo_text_names_the_mode_and_how_far_it_is(run):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--goal", "x=0.1", "--observe", "1"], ["do not see", "hrsynth legs"]),
-        (["--goal", "x=0.1", "--observe", "7"], ["no leg or link", "'7'"]),
+        (["--goal", "x=0.1", "--observe", "1"], ["do not determine", "hrsynth legs"]),
+        (["--goal", "x=0.1", "--observe", "7"], ["unknown leg or link", "'7'"]),
         (["--goal", "x=0.1", "--noise", "90deg"], ["noise", "90deg", "below 90deg"]),
         (["--goal", "x=0.1", "--noise", "1px"], ["1px", "0.1deg"]),
         (["--goal", "x=0.1", "--sense", "edges", "--noise", "1deg"], ["1deg", "pixels"]),
@@ -1272,7 +1272,7 @@ def test_files_that_are_none(run, robot, tmp_path: Path):
         stream.truncate(200_000_000)
     assert "no such file" in run("derive", tmp_path / "none.urdf").refused()[0]
     assert "a robot's file: got ''" in run("derive", "").refused()[0]
-    assert "no such joint" in run("derive", robot(FOUR_BAR), "--motors", "").refused()[0]
+    assert "no such movable joint" in run("derive", robot(FOUR_BAR), "--motors", "").refused()[0]
     assert "too large" in run("derive", sparse).refused()[0]
     assert "empty file" in run("derive", robot("", "empty.urdf")).refused()[0]
     assert "empty file" in run("derive", robot(" \n\n", "blank.urdf")).refused()[0]

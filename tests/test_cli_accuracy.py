@@ -84,7 +84,7 @@ def test_refusals_are_one_line(
     assert word in line
 
 
-@pytest.mark.parametrize(("legs", "word"), [("1", "do not see"), ("7", "no leg or link")])
+@pytest.mark.parametrize(("legs", "word"), [("1", "do not determine"), ("7", "unknown leg or link")])
 def test_legs_that_cannot_be_watched_are_refused_in_one_line(
     capsys: pytest.CaptureFixture[str], legs: str, word: str
 ) -> None:

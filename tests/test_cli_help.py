@@ -145,7 +145,7 @@ def test_a_flag_can_be_denied_and_words_that_repeat_are_all_taken():
     ("words", "told"),
     [
         ("derive", "derive: ROBOT missing"),
-        ("accuracy delta", "as --cone 0.1deg, or"),
+        ("accuracy delta", "bounds are missing. Give --cone 0.1deg for directions, or"),
         ("catalog site", "catalog site: -o, --output DIR missing"),
         ("derive quattro --observ 1", "derive has no option --observ. Try --observe"),
         ("derive quattro -x", "derive has no option -x. Try --as-written"),

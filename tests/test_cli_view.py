@@ -55,7 +55,7 @@ def test_other_endings_are_refused(capfd: pytest.CaptureFixture[str], tmp_path: 
 def test_what_cannot_be_done_is_refused_in_one_line(capfd: pytest.CaptureFixture[str], tmp_path: Path):
     pytest.importorskip("uvicorn")
     assert_refused(ask(capfd, "rrrrr_m1", "--static", str(tmp_path / "none" / "view.html")), 2, "no such folder")
-    assert_refused(ask(capfd, "rrrrr_m1", "--observe", "7", "--no-open"), 2, "has no leg or link")
+    assert_refused(ask(capfd, "rrrrr_m1", "--observe", "7", "--no-open"), 2, "unknown leg or link")
     assert_refused(ask(capfd, "nobody", "--static", str(tmp_path / "view.html")), 2, "nobody")
     assert_refused(ask(capfd, "rrrrr_m1", "--port", "70000"), 2, "65535")
     assert not list(tmp_path.iterdir())

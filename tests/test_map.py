@@ -47,7 +47,7 @@ def test_an_error_ends_all_and_says_what_was_asked():
         with pytest.raises(PoseReachFailure) as caught:
             hrsynth.map_robots("check", ROBOTS, poses=POSES, jobs=jobs)
         (note,) = caught.value.__notes__
-        assert note.startswith("asked: robot <Mechanism: 3rrr_m1")
+        assert note.startswith("request: robot <Mechanism: 3rrr_m1")
         assert "at x=9,y=0,z=0" in note
         assert caught.value.exit_status == 3
 
@@ -64,7 +64,7 @@ def test_a_robot_that_cannot_be_read_is_an_error_in_the_place_of_its_answers():
         robots: list = ["rrrrr_m1", "nope", 5]
         found = hrsynth.map_robots(question, robots, legs=["1", "2"], jobs=1, errors="keep")
         assert [isinstance(each, BadRequest) for each in found] == [False, False, True, True, True, True]
-        assert [each.__notes__[0].startswith("asked: robot 'nope', observe") for each in found[2:4]] == [True, True]
+        assert [each.__notes__[0].startswith("request: robot 'nope', observe") for each in found[2:4]] == [True, True]
     with pytest.raises(BadRequest, match="nope"):
         hrsynth.map_robots("derive", ["rrrrr_m1", "nope"], jobs=1)
 

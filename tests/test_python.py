@@ -68,7 +68,7 @@ def test_a_wrong_keyword_is_told_with_the_nearest_and_all(ask: Any, near: str):
         (lambda: hrsynth.lint(hrsynth.load("3rrr_m1")), "a path, the name of a shipped robot"),
         (lambda: hrsynth.save("3rrr_m1", "x.xml", meshes="move"), "keep, copy"),
         (lambda: hrsynth.branch("rrrrr_m1", [1, 2]), "hip=-1:1"),
-        (lambda: hrsynth.branch("rrrrr_m1", "shoulder_1"), "^a box of motors: got 'shoulder_1', expected low:high"),
+        (lambda: hrsynth.branch("rrrrr_m1", "shoulder_1"), "^--box: got 'shoulder_1', expected low:high"),
         (lambda: hrsynth.draw(5), "draw: not a result"),
         (lambda: hrsynth.check("rrrrr_m1", seed="a"), "seed: got 'a', expected an integer"),
         (lambda: hrsynth.check("rrrrr_m1", seed=-1), "at least 0"),
@@ -122,7 +122,7 @@ def test_a_value_of_another_kind_is_told_with_what_is_allowed(ask: Any, allowed:
 def test_what_is_left_out_is_told_with_the_function():
     with pytest.raises(TypeError, match=r"^path: .*'goal'; it takes robot, .*goal"):
         hrsynth.path("3rrr_m1", start="x=0")  # type: ignore[call-arg]
-    with pytest.raises(BadRequest, match="how wrong the observations may be is not given: expected a cone about"):
+    with pytest.raises(BadRequest, match="the measurement bounds are missing. Give --cone 0.1deg"):
         hrsynth.accuracy("3rrr_m1")
 
 

@@ -54,7 +54,7 @@ HOW_TO = [
     "use",
 ]
 PARAGRAPH, SENTENCE, TASK = 90, 25, 600
-SINCE = "2026-11-29T16:00:00Z"
+SINCE = "2026-11-29T17:25:00Z"
 """Commits from then on keep the rule."""
 
 Breach = tuple[str, str, int, str]

@@ -159,6 +159,7 @@ class NoResult(HrsynthError):
     exit_status = 3
 
     def __init__(self, problem: str, remedy: str = "") -> None:
+        self.problem, self.remedy = problem, remedy
         super().__init__(compose_message(problem, None, None, remedy))
 
 

@@ -148,7 +148,7 @@ def test_a_page_says_what_the_record_says(made, catalog):
             assert f"Refused: {each.fact['refused']}" in text
             continue
         assert f">{each.fact['verdict'].capitalize()}.<" in text
-        assert f" shows {each.fact['rank']} of the platform's {each.fact['dof']} freedoms" in text
+        assert f" shows {each.fact['rank']} of {each.fact['dof']} platform dof" in text
         assert ("Proved in exact arithmetic" in text) == (each.fact["instances"] == 1)
         assert f"confirmed at {each.fact['confirmed']} closed configurations" in text
         for step in each.fact["steps"]:

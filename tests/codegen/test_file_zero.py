@@ -256,7 +256,7 @@ def test_a_box_without_the_zero_configuration_names_it(tmp_path: Path):
     """The loop is open at the file's zero: the box has to hold where it was closed."""
     case = CASES["limited knee"]
     robot = hrsynth.load(case.file(tmp_path), platform=case.platform)
-    with pytest.raises(BadRequest, match=r"there it is 1\.\d"):
+    with pytest.raises(BadRequest, match=r"with 1\.\d+ \(zero configuration\) in it"):
         hrsynth.export(robot, "numpy", {"drive": (-0.1, 0.1)})
 
 

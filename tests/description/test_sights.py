@@ -160,10 +160,13 @@ ASKED_WRONG = [
     ),
     (["--sensor", "image_circle:platform@1,2,3/0,0,1/-1"], "radius (m): got -1.0, expected more than 0"),
     (["--camera", "eye=base@0,0,0,"], "--camera eye=base@0,0,0,: an empty number"),
-    (["--camera", "eye=base@0,0,0"], "a camera to which nothing is given to see: got 'eye', expected --sensor eye="),
+    (
+        ["--camera", "eye=base@0,0,0"],
+        "--camera eye: no observation uses this camera of gough_stewart. Add --sensor eye=",
+    ),
     (
         ["--camera", "eye=base", "--camera", "far=base", "--sensor", "eye=point:platform@1,2,3"],
-        "a camera to which nothing is given to see: got 'far', expected --sensor far=",
+        "--camera far: no observation uses this camera of gough_stewart. Add --sensor far=",
     ),
     (["--sensor", "line:platform@1,2,3"], "without the attribute: got 'axis'"),
     (["--sensor", "point:platform@1,2,3/0,0,1"], "too many values for this kind: got '0,0,1', expected at"),
@@ -192,7 +195,10 @@ ASKED_WRONG = [
         ["--camera", "a=base@1,2,3/1,2,3/-4", "--sensor", "point:platform@1,2,3"],
         "got '-4', expected the focal length",
     ),
-    (["--camera", "nowhere", "--sensor", "point:platform@1,2,3"], "has no link for the camera: got 'nowhere'"),
+    (
+        ["--camera", "nowhere", "--sensor", "point:platform@1,2,3"],
+        "--camera: link of gough_stewart: got 'nowhere', expected base",
+    ),
 ]
 
 
@@ -214,7 +220,7 @@ def test_commands_that_know_segments_only_say_so(
     save(add_observations(load("delta"), [parse_see("point:platform@0,0,0.1", [])]), tmp_path / "delta.urdf")
     words = ["--start", "x=0", "--goal", "x=0.01", "--dynamics"]
     assert run_command([command, str(tmp_path / "delta.urdf"), *words]) == 2
-    assert "knows directions of segments only" in capsys.readouterr().err
+    assert "supports directions of segments only: got 'point point_1'" in capsys.readouterr().err
 
 
 @pytest.mark.some(1)
@@ -264,7 +270,7 @@ def test_the_command_line_and_python_see_the_same(capsys: pytest.CaptureFixture[
 
 @pytest.mark.parametrize("asked", [{"sensor": 5}, {"sensor": [3]}, {"camera": 4}])
 def test_what_is_no_text_is_refused(asked: dict[str, Any]) -> None:
-    with pytest.raises(BadRequest, match="cameras and what they see: got"):
+    with pytest.raises(BadRequest, match="--camera, --sensor: got .*, expected texts such as"):
         ObservedRobot.of("gough_stewart", **asked)
 
 

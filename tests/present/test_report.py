@@ -164,8 +164,8 @@ def test_what_is_refused_is_one_sentence():
     told = [text_of(each) for each in page.xpath("//*[@class='refused']")]
     assert told == [
         "The measured values leave 1 of the platform's dof undetermined: a continuous family of dimension 1.",
-        "There is no accuracy map. The error is infinite at every pose, the legs do not see translation along z (at "
-        "the zero configuration).",
+        "There is no accuracy map. The error is infinite at every pose, the legs do not determine translation along z "
+        "(at the zero configuration).",
     ]
 
 

@@ -337,11 +337,11 @@ def test_a_noisy_run_that_meets_a_limit_is_over():
 REFUSED: list[tuple[str, Callable[[], object], type[Exception], str]] = [
     ("goal out of reach", lambda: servo(load("delta"), start="x=0", goal="x=9"), PoseReachFailure, "x=9"),
     ("start out of reach", lambda: servo(load("delta"), start="x=9", goal="x=0"), PoseReachFailure, "x=9"),
-    ("too few legs", lambda: servo(load("delta"), "1", start="x=0", goal="x=0.1"), BadRequest, "do not see"),
+    ("too few legs", lambda: servo(load("delta"), "1", start="x=0", goal="x=0.1"), BadRequest, "do not determine"),
     ("unknown leg", lambda: servo(load("delta"), "7", start="x=0", goal="x=0.1"), BadRequest, "'7'"),
     ("no gain", lambda: servo(load("delta"), start="x=0", goal="x=0.1", gain=0.0), BadRequest, "gain"),
     ("wide cone", lambda: servo(load("delta"), start="x=0", goal="x=0.1", noise="90deg"), BadRequest, "90deg"),
-    ("no cone", lambda: servo(load("delta"), start="x=0", goal="x=0.1", noise="0deg"), BadRequest, "more than zero"),
+    ("no cone", lambda: servo(load("delta"), start="x=0", goal="x=0.1", noise="0deg"), BadRequest, "more than 0"),
     ("pixels of directions", lambda: servo(load("delta"), start="x=0", goal="x=0.1", noise="1px"), BadRequest, "px"),
     (
         "edges as wide as pictures",
@@ -385,7 +385,7 @@ def test_a_singular_pose_is_refused():
 def test_robots_that_are_not_controllable_are_refused(name: str):
     found = setting(name)
     pose = found.motion.pose(found.motion.home)
-    with pytest.raises(BadRequest, match="do not see"):
+    with pytest.raises(BadRequest, match="do not determine"):
         servo(load(name), start=pose, goal=pose)
 
 

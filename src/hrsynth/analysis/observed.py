@@ -645,7 +645,7 @@ def _choose_observations(
             observation = given or observe_segment(decomposition, link)
         else:
             raise BadRequest(
-                f"--observe: leg or link of {decomposition.mechanism.name}",
+                f"--observe: unknown leg or link of {decomposition.mechanism.name}",
                 name,
                 "legs "
                 + ", ".join([*decomposition.labels, *list_labels(given_too)])

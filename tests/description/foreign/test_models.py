@@ -70,9 +70,9 @@ def test_every_model_is_written_and_read_back(name: str, ending: str, tmp_path: 
 
 def test_what_could_not_be_read_is_told():
     flat = [note.text for note in model("urdfplus-fourbar/four_bar.urdf").notes]
-    assert any("2 freedoms there, 1 nearby" in text for text in flat)
+    assert any("mobility 2 there, 1 nearby" in text for text in flat)
     stewart = [str(note) for note in model("stewart-sdf-ritwik/stewart_sdf.sdf").notes]
-    assert any(text.startswith("guess: <axis2> 0 0 1") for text in stewart)
+    assert any(text.startswith("assumption: <axis2> 0 0 1") for text in stewart)
     assert any("loop_1" in note.text for note in model("gepetto-5bar").notes if note.kind == "solved")
 
 

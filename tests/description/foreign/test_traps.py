@@ -504,7 +504,7 @@ def test_loops_that_rounding_may_hold_are_refused_as_such(tmp_path: Path):
     main(str(tmp_path), "line_symmetric_bricard")
     whole = (tmp_path / "line_symmetric_bricard.urdf").read_text()
     text = re.sub(r"-?\d+\.\d+(e-?\d+)?", lambda number: f"{float(number[0]):.5f}", whole)
-    with pytest.raises(RoundingLimitedRank, match="1 of their constraints holds by no more than that") as caught:
+    with pytest.raises(RoundingLimitedRank, match="is as large as 1 singular value of the loop Jacobian") as caught:
         read(tmp_path, text)
     assert "gap" not in str(caught.value)
     assert caught.value.directions == 1

@@ -129,7 +129,7 @@ def test_an_open_loop_is_told_where_it_is(tmp_path: Path):
     path = written(tmp_path, "${1.5 * w}", "${2.5 * w}")
     with pytest.raises(HrsynthError) as refused:
         load(path)
-    assert refused.value.lines()[0].startswith(f"{place_of(tmp_path, '<loop')}: the loop 'end' is open")
+    assert refused.value.lines()[0].startswith(f"{place_of(tmp_path, '<loop')}: loop 'end' is open")
 
 
 def test_lint_tells_lines(tmp_path: Path):

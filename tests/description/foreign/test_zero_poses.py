@@ -286,9 +286,9 @@ def test_a_zero_pose_that_loses_a_freedom_is_called_singular(tmp_path: Path):
     flat = flat.replace('anchor="0.15 0.2 0"', 'anchor="0.15 0 0"')
     stays = read(tmp_path, flat, "xml", platform="b1", base="carriage", keyframe="zero")
     left = read(tmp_path, flat, "xml", platform="b1", base="carriage")
-    assert check(stays).postures[0].hidden.singularity_indices.type2
+    assert check(stays).postures[0].hidden.singularity_indices.is_type2
     assert any(
         "the zero configuration is a Type 2 singularity of all legs together" in note.text for note in left.notes
     )
-    assert not check(left).postures[0].hidden.singularity_indices.type2
+    assert not check(left).postures[0].hidden.singularity_indices.is_type2
     assert [each.rank for each in legs(stays).sets] == [each.rank for each in legs(left, seed=1).sets]

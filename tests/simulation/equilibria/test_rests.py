@@ -696,11 +696,11 @@ def test_rests_with_supposed_depths_are_those_of_the_law(depth: str, mixed: bool
 def test_what_cannot_be_asked_of_cameras_is_refused_in_one_line(tmp_path: Path) -> None:
     for options, said in (
         ({"goal": "x=0,y=0,z=-0.5,rpy=0/0/0"}, "not in front of its camera at the goal"),
-        ({"goal": TILTED, "complete": True}, "knows directions of segments only"),
+        ({"goal": TILTED, "complete": True}, "supports directions of segments only: got 'point "),
     ):
         with pytest.raises(BadRequest, match=said):
             body(tmp_path, seen(SQUARE), **options)
-    with pytest.raises(BadRequest, match="a camera to which nothing is given to see"):
+    with pytest.raises(BadRequest, match="--camera eye: no observation uses this camera"):
         equilibria(FIVE_BAR, camera="eye=base@0,0,0", goal=POSE)
 
 

@@ -229,7 +229,7 @@ def _start_plane(
         return plane, names, track_to_pose(start, observation_model, plane, motion) if plane.given else start
     except PoseReachFailure as error:
         name = start.model.mechanism.name
-        raise NoReachablePose(name, f"the plane {plane}", str(error).removeprefix(f"{name}: ")) from None
+        raise NoReachablePose(name, f"the plane {plane}", error.problem.removeprefix(f"{name}: ")) from None
 
 
 def _find_plane_end(coarse: Grid, found: Array, axis: int, end: int, met: Callable[[Grid], NDArray[np.bool_]]) -> float:
@@ -277,8 +277,8 @@ def _choose_axes(
     allowed = ["fewer fixed parts"] if fixed else []
     allowed += [f"--grid {left[0]}=-0.1:0.1:9 of check, accuracy or basins for a line of poses"] if left else []
     raise BadRequest(
-        f"--plane {plane}: two parts of the pose of {name} must be free, here {told or 'none'}",
-        remedy=f"Use {'; '.join(allowed) or 'single poses'}.",
+        f"{f'--plane {plane}'.strip()}: two parts of the pose of {name} must be free, here {told or 'none'}",
+        remedy=f"Use {', or '.join(allowed) or 'single poses'}.",
     )
 
 

@@ -70,7 +70,7 @@ def ask(robot: str, question: Callable[[], Answer]) -> Answer | RefusedPart:
 
 def describe_refusal(error: HrsynthError, robot: str) -> str:
     """Return the message of an error without the name of the robot and the remedy."""
-    return (error.problem if isinstance(error, BadRequest) else str(error)).removeprefix(f"{robot}: ")
+    return (error.problem if isinstance(error, BadRequest | NoResult) else str(error)).removeprefix(f"{robot}: ")
 
 
 def map_error_plane(setup: ObservedRobot, seed: int) -> Accuracy:

@@ -26,7 +26,7 @@ def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[str] | Re
         yield Refusal("the joints of a formation define how its links can move")
         return
     if state.watched & set(own.links) or state.actuators & set(own.joints):
-        yield Refusal("the leg carries an observed link or a camera")
+        yield Refusal("the leg carries an observed link, an observed joint or a camera")
         return
     observed = state.observed_labels()
     ends = dict.fromkeys(each.platform_link for each in state.real.legs if each.label in observed)
