@@ -122,7 +122,7 @@ def test_a_value_of_another_kind_is_told_with_what_is_allowed(ask: Any, allowed:
 def test_what_is_left_out_is_told_with_the_function():
     with pytest.raises(TypeError, match=r"^path: .*'goal'; it takes robot, .*goal"):
         hrsynth.path("3rrr_m1", start="x=0")  # type: ignore[call-arg]
-    with pytest.raises(BadRequest, match="the measurement bounds are missing. Give --cone 0.1deg"):
+    with pytest.raises(BadRequest, match=r"the measurement bounds are missing\. Give --cone 0.1deg"):
         hrsynth.accuracy("3rrr_m1")
 
 

@@ -79,10 +79,10 @@ def test_gzip_is_inflated_up_to_the_limit():
     assert untrusted.unpack_gzip(gzip.compress(b"x" * 1000), "f", 1000) == b"x" * 1000
     assert untrusted.unpack_gzip(one + b"\0" * 8, "f", 1000) == b"x" * 600
     for bomb in (gzip.compress(b"x" * 1001), one + one, gzip.compress(b"x" * 10**7)):
-        with pytest.raises(BadRequest, match="unpacks to more than 1000 bytes. Use"):
+        with pytest.raises(BadRequest, match=r"unpacks to more than 1000 bytes\. Use"):
             untrusted.unpack_gzip(bomb, "f", 1000)
     for bad in (one[:-9], b"\x1f\x8bno", one + b"rest", gzip.compress(one)[:5]):
-        with pytest.raises(BadRequest, match="truncated, or not compressed"):
+        with pytest.raises(BadRequest, match="truncated or not gzip"):
             untrusted.unpack_gzip(bad, "f", 1000)
 
 
@@ -605,7 +605,7 @@ def test_a_certificate_file_is_checked_within_limits(tmp_path: Path, monkeypatch
     monkeypatch.setattr(verify_ranks, "__file__", str(checker))
     monkeypatch.setattr(certificates_, "VERIFY_TIMEOUT_S", 1)
     for body, status, said in (
-        ("while True: pass", 3, "memory or time"),
+        ("while True: pass", 3, "memory or time|not read within 1 s"),
         ("bytearray(10**10)", 3, "bytes of memory"),
         ("print('accepted: rank')", 0, "rank"),
         ("print('refused: a: b')", 3, "a: b"),
@@ -614,7 +614,7 @@ def test_a_certificate_file_is_checked_within_limits(tmp_path: Path, monkeypatch
         monkeypatch.setattr(certificates_.ranks, "describe_ranks", lambda record: "")
         assert run_command(["verify", str(file)]) == status
         (line,) = "".join(capsys.readouterr()).splitlines()
-        assert said in line
+        assert re.search(said, line)
     file.write_text(" " * (verify_ranks.LENGTH + 1))
     assert run_command(["verify", str(file)]) == 2
     assert f"longer than {verify_ranks.LENGTH} characters" in capsys.readouterr().err

@@ -270,7 +270,7 @@ def test_the_command_line_and_python_see_the_same(capsys: pytest.CaptureFixture[
 
 @pytest.mark.parametrize("asked", [{"sensor": 5}, {"sensor": [3]}, {"camera": 4}])
 def test_what_is_no_text_is_refused(asked: dict[str, Any]) -> None:
-    with pytest.raises(BadRequest, match="--camera, --sensor: got .*, expected texts such as"):
+    with pytest.raises(BadRequest, match=r"--camera, --sensor: got .*, expected texts such as"):
         ObservedRobot.of("gough_stewart", **asked)
 
 

@@ -156,7 +156,7 @@ def met(one, far, two, near):
             "rrrrr_m1",
             {"start": "x=0", "goal": "x=0.02"},
             {"motor": None},
-            "motors for 1 of the platform's 2 freedoms",
+            "1 motor for 2 platform dof: too few for the commanded motion",
             marks=pytest.mark.slow,
         ),
         (
@@ -360,7 +360,7 @@ REFUSED: list[tuple[str, Callable[[], object], type[Exception], str]] = [
         "endless physics",
         lambda: servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0,z=-0.6", dynamics=True, gain=1e-9),
         BadRequest,
-        "a larger gain",
+        "a larger --gain",
     ),
     ("no such sense", lambda: servo(load("delta"), start="x=0", goal="x=0.1", sense="touch"), BadRequest, "touch"),
 ]

@@ -235,4 +235,4 @@ def _tree(expression: Any) -> Any:
         return ["*", *[_tree(expression.base)] * int(expression.exp)]
     if type(expression).__name__ in ("dot", "cross", "det"):
         return [type(expression).__name__, *map(_tree, expression.args)]
-    raise PathRejection("a condition that is not an expression in vectors")
+    raise PathRejection("the condition is not a vector expression")

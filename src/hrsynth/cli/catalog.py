@@ -66,7 +66,7 @@ FILTER = (
         kind=bool,
         flags=("--parallelograms/--no-parallelograms",),
     ),
-    Option("fewest", "Number of legs in the smallest set with the largest rank.", kind=int, low=0),
+    Option("fewest", "Fewest legs that together reach the highest rank.", kind=int, low=0),
     Option("modes", "Number of assembly modes, complex ones included.", kind=int, low=0),
     Option("text", "Text that occurs in any field, or a name: Delta."),
 )

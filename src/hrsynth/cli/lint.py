@@ -96,7 +96,7 @@ def add(app: Group) -> None:
             Option("ignore", "A rule to leave out; repeat for more.", "RULE", list[str], words=list_rule_names),
             Option(
                 "fail_on",
-                "The mildest severity that makes the exit status 1: error, warning, note, nothing.",
+                "Exit status is 1 at this severity or worse: error, warning, note; nothing: never.",
                 "SEVERITY",
                 default="error",
                 words=FAILING,

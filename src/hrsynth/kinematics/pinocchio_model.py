@@ -49,7 +49,7 @@ class PinocchioModel:
         self._geared = len(self._gears) > 0
         if self.model.nv > MODEL_COORDINATES_MAX:
             raise BadRequest(
-                f"{mechanism.name}: joints with {self.model.nv} coordinates", None, f"up to {MODEL_COORDINATES_MAX}"
+                f"{mechanism.name}: joint coordinates", str(self.model.nv), f"at most {MODEL_COORDINATES_MAX}"
             )
         self.data = self.model.createData()
         self.nv: int = self.model.nv

@@ -173,7 +173,7 @@ def test_a_long_chain_is_refused_in_time_where_its_twin_would_be_too_large(tmp_p
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert run.returncode == 2, run.stderr[-500:]
-    assert "joints with 990 coordinates, expected up to 256" in run.stderr.splitlines()[-1]
+    assert "joint coordinates: got 990, expected at most 256" in run.stderr.splitlines()[-1]
 
 
 def test_includes_stay_in_their_folder_and_come_once(tmp_path: Path):

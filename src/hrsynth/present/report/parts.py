@@ -17,7 +17,7 @@ from ...analysis.derive import Derivation
 from ...analysis.modes.modes import AssemblyModes, modes
 from ...analysis.observed import ObservedRobot
 from ...analysis.singularity.singularities import Singularity, singularities
-from ...errors import BadRequest, HrsynthError
+from ...errors import BadRequest, HrsynthError, NoResult
 from ...mechanism.cameras import CameraObservation
 from ...mechanism.pose import Pose
 from ..view.scale import CONE_TEXT

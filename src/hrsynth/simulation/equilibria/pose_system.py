@@ -228,7 +228,7 @@ class LegSystem(Value):
 
     @cached_property
     def holding(self) -> list[int]:
-        """The lengths of held rods: without a multiplier such a leg holds nothing."""
+        """Rows of the held rods' length multipliers; at zero, the rod is inactive."""
         counts = [4 if each.is_free_rod else (each.place is not None) + each.held for each in self.pieces]
         ends = np.cumsum(counts) + (self.quaternion.stop > self.quaternion.start)
         return [int(end) - 2 for each, end in zip(self.pieces, ends, strict=True) if each.held and not each.is_free_rod]

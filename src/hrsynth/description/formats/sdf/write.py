@@ -80,7 +80,7 @@ def _write_joint(model: xml.Element, robot: Mechanism, joint: Joint, gear: tuple
     element = etree.SubElement(model, "joint", name=joint.name, type=kind)
     etree.SubElement(element, "parent").text = joint.predecessor
     if joint.successor == WORLD:
-        raise BadRequest(f"{robot.name}: joint {joint.name!r} has the world as its successor", WORLD, "a link")
+        raise BadRequest(f"{robot.name}: joint {joint.name!r} has the world as its child", WORLD, "a link")
     etree.SubElement(element, "child").text = joint.successor
     write_pose(element, build_pose((invert_pose(robot.links[joint.successor].pose) @ np.append(joint.point, 1.0))[:3]))
     for tag, axis in zip(("axis", "axis2"), joint.axes, strict=False):

@@ -114,7 +114,7 @@ def _describe_leg(request: Request, setup: ObservedRobot, leg: Leg) -> dict[str,
 
 
 def list_assumptions(request: Request) -> ImportChoices | None:
-    """Return the assumptions of reading a file, None if there are none or it cannot be read."""
+    """Return what reading the file assumed; None if nothing, or if the file is unreadable."""
     said = dict(request.source.options)
     try:
         given = Overrides.said(
