@@ -84,9 +84,7 @@ def _renamed(leg, rng):
         to = "".join(rng.sample(kind, 3))
         leg = LegKey(
             tuple(
-                joint.__class__(
-                    joint.letter, joint.axes.translate(str.maketrans(kind, to)), joint.motor, joint.observed_axes
-                )
+                joint.__class__(joint.letter, joint.axes.translate(str.maketrans(kind, to)), joint.motor, joint.watched)
                 for joint in leg.joints
             )
         )

@@ -84,9 +84,9 @@ def test_the_words_of_a_film_tell_start_crossings_and_end():
     moments = list(range(0, len(found.run.times), 2))
     words = list(list_captions(found, moments))
     assert len(words) == len(moments)
-    assert words[0].startswith("The start")
-    assert words[-1].startswith("The end: the goal. The platform is")
-    crossed = {place for place, each in zip(moments, words, strict=True) if "crossed" in each or "limit" in each}
+    assert words[0].startswith("Start.")
+    assert words[-1].startswith("End: goal. The platform is")
+    crossed = {place for place, each in zip(moments, words, strict=True) if "singularity" in each}
     assert bool(crossed) == bool(found.track.passages)
     for each in found.track.passages or ():
         assert any(0 <= place - each.place <= 2 * CROSSING_CAPTION_FRAMES_COUNT for place in crossed)

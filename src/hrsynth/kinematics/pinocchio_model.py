@@ -48,9 +48,7 @@ class PinocchioModel:
         self._gears = self._gear_rows()
         self._geared = len(self._gears) > 0
         if self.model.nv > MODEL_COORDINATES_MAX:
-            raise BadRequest(
-                f"{mechanism.name}: joint coordinates", str(self.model.nv), f"at most {MODEL_COORDINATES_MAX}"
-            )
+            raise BadRequest(f"{mechanism.name}: joint coordinates", self.model.nv, f"at most {MODEL_COORDINATES_MAX}")
         self.data = self.model.createData()
         self.nv: int = self.model.nv
         self.q0: Array = pin.neutral(self.model)

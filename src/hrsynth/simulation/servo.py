@@ -360,7 +360,8 @@ class ServoTask:
             if beyond := list_joints_beyond(model, at.q):
                 yield f"the {name} is beyond the limits of {', '.join(beyond)}"
         if self.setup.segments and (motors := len(model.actuated_indices())) < self.setup.dof:
-            yield f"{motors} motor{'s' * (motors != 1)} for {self.setup.dof} platform dof: too few for the commanded motion"
+            count = f"{motors} motor{'s' * (motors != 1)} for {self.setup.dof} platform dof"
+            yield f"{count}: too few for the commanded motion"
         if run.stopped == EFFORT:
             yield f"the run was stopped after {RUN_EVALUATIONS_MAX:,} configurations, at {run.times[-1]:.3g} s"
         if self.conditions.has_noise:
