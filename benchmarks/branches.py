@@ -31,7 +31,7 @@ def proved(name: str, half: float) -> BranchProof | None:
     limits = robot.limited
     box = {}
     for joint in robot.joints.values():
-        if joint.actuated:
+        if joint.is_actuated:
             low, high = limits.get(joint.name, (-half, half))
             box[joint.name] = max(low, -half), min(high, half)
     found = hrsynth.branch(name, box, max_cells=CELLS)

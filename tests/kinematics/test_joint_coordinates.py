@@ -187,7 +187,8 @@ def test_coordinates_that_contradict_each_other_are_refused() -> None:
 @pytest.mark.parametrize("command", ["check", "modes", "accuracy", pytest.param("equilibria", marks=pytest.mark.slow)])
 def test_each_command_takes_them_and_tells_them(command: str, capsys) -> None:
     more = ["--cone", "0.1deg"] * (command == "accuracy")
-    assert run_command([command, "3rrr_m1", "--at", "motors:0.05,0,0", "--json", *more]) == 0
+    pose = "--goal" if command == "equilibria" else "--at"
+    assert run_command([command, "3rrr_m1", pose, "motors:0.05,0,0", "--json", *more]) == 0
     told = capsys.readouterr().out
     first = next(each for each in json.loads(told).values() if isinstance(each, list) and "coordinates" in str(each))[0]
     assert first["coordinates"]["motors"] == pytest.approx(

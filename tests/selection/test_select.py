@@ -121,7 +121,7 @@ def test_a_run_that_ends_elsewhere_discards_its_set() -> None:
     ran = work().ran(begun)
     assert ran.run is not None
     assert ran.run.verdict == "assembly mode"
-    assert "ends in: mode" in str(ran.discarded)
+    assert "outcome of the simulated run is assembly mode" in str(ran.discarded)
 
 
 def test_bounds_of_errors_have_their_gaps():
@@ -229,13 +229,13 @@ def test_endings_are_those_of_the_single_questions() -> None:
     goal = track_to_pose(
         setup.all_samples.start, setup.all_samples.observation_model, Pose.parse("x=-0.01,y=0.03"), setup.motion
     )
-    assert best.ends is not None
-    assert best.ends.length == pytest.approx(certified_radius(setup, goal).length)
+    assert best.equilibria is not None
+    assert best.equilibria.length == pytest.approx(certified_radius(setup, goal).length)
     found = EquilibriumSearch.of(setup, goal).answer(minima=True).stable
-    assert best.ends.others == tuple(sorted(each.kind for each in found if each.kind != "goal"))
-    assert best.ends.others
+    assert best.equilibria.others == tuple(sorted(each.kind for each in found if each.kind != "goal"))
+    assert best.equilibria.others
     record = best.to_dict()["equilibria"]
-    assert record["attracting"] == len(record["kinds"]) == len(best.ends.others)
+    assert record["attracting"] == len(record["kinds"]) == len(best.equilibria.others)
 
 
 def test_a_singular_end_discards() -> None:
@@ -387,11 +387,11 @@ def test_sets_of_points_are_ranked_by_what_attracts_their_loops(tmp_path: Path) 
         runs=0,
         examine=4,
     )
-    others = {each.legs: each.ends.others for each in found.kept if each.ends is not None}
+    others = {each.legs: each.equilibria.others for each in found.kept if each.equilibria is not None}
     assert [len(kinds or ()) for kinds in others.values()] == [0, 0, 1, 1]
     assert all(("point_5" in legs) is not bool(kinds) for legs, kinds in others.items())
     assert tuple(f"point_{number}" for number in (1, 2, 3, 4)) in others
-    assert all("directions of segments only" in each.ends.why for each in found.kept if each.ends is not None)
+    assert all("directions of segments only" in each.equilibria.why for each in found.kept if each.equilibria is not None)
     worst = [each.errors.position.largest for each in found.kept if each.errors is not None]
     assert worst != sorted(worst)
 

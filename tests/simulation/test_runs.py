@@ -248,7 +248,7 @@ def test_a_bias_holds_the_platform_where_the_measured_directions_are_the_desired
     last = found.run.commands[-1]
     assert found.outcome == GOAL
     assert found.spread is not None
-    assert found.spread.aside
+    assert found.spread.has_bias
     assert found.spread.metres > 1e-3
     assert last.speed < 1e-4 < last.size
     assert "constant over time" in str(found.noise)

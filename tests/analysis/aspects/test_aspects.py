@@ -405,7 +405,7 @@ def test_reasons_why_nothing_is_decided():
     places = list(walk_randomly(lost.setup.samples.start, 2))
     answer = lost.join(*places)
     assert (answer.verdict, answer.certified) == (UNDECIDED, False)
-    assert "1 of 2 freedoms is never seen: translation along y (at the zero configuration)" in answer.reason
+    assert "1 of 2 dof never observed: translation along y (at the zero configuration)" in answer.reason
 
     parasitic = aspects_of("3rps")
     verdicts = set()

@@ -156,7 +156,7 @@ def test_a_platform_on_points_of_similar_conics_moves_generically():
     (motion,) = found.self_motions
     assert found.found.continuous_family == motion.dimension == 1
     assert np.abs(lengths(motion, anchors, tips) - np.linalg.norm(tips - anchors, axis=1)).max() < 1e-9
-    assert "leave 1 of the platform's freedoms undetermined" in str(found.found.singular_solutions)
+    assert "leave 1 of the platform's dof undetermined" in str(found.found.singular_solutions)
 
 
 def test_two_circles_in_one_move_a_five_bar():

@@ -176,7 +176,7 @@ def test_rests_are_those_of_the_joints_by_hand(turn):
     each choice of reversed rods, the gradient over the joints vanishes; each zero by itself that Newton's method meets
     from anywhere is a member."""
     found = listed(turn)
-    assert covered().complete
+    assert covered().is_complete
     assert len(found) == 8 * 24
     assert max(np.abs(each.p).max() for each in found) > 20
     coordinates = np.array([joints(each, turn) for each in found])

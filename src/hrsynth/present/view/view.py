@@ -132,7 +132,7 @@ class View(Result, shown_as="view"):
         BadRequest
             If the port is not available.
         """
-        return load_function("studio.server:view_server")(self, port, open_)
+        return load_function("studio.server:serve_view")(self, port, open_)
 
     dof = Shown(int, lambda self: self.setup.dof)
     shown = Shown(dict[str, str], lambda self: {machine.key: machine.words for machine in self.machines})

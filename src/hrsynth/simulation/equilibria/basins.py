@@ -428,7 +428,7 @@ class BasinSearch:
             numbers[away] = outcomes.number(told[0])
         numbers[runs.stopped == OVER] = outcomes.number(Outcome(RunOutcome(TIME, "the time ran out")))
         same = [
-            outcome.alike(outcomes.all[numbers[run]], length)
+            outcome.is_same_outcome(outcomes.all[numbers[run]], length)
             for run, outcome in zip(checked, chain(*alone), strict=True)
             if numbers[run] >= 0
         ]
