@@ -217,7 +217,7 @@ def test_a_start_in_another_working_mode_may_end_elsewhere():
         at = ClosedConfiguration.of(goal.model, q)
         if residual < 1e-9 and np.abs(at.pose(motion.link) - goal.pose(motion.link)).max() > 0.1:
             apart.append(at)
-    assert found.holds(apart[0].pose(motion.link))
+    assert found.has_start(apart[0].pose(motion.link))
     search = EquilibriumSearch.of(setup, goal)
     run = Loop(
         replace(search.law, gain=0.8), setup.all_samples.observation_model, FixedDirections(search.desired)
