@@ -285,7 +285,7 @@ def test_ten_observations_that_are_all_needed_are_told_without_all_their_sets(pa
     assert [each.legs for each in found.sets] == [*((each,) for each in labels), labels]
     said = text(found)
     assert said.index("smallest sets") < said.index("verdict")
-    assert "no other set as small" in said
+    assert "no other set of this size" in said
 
 
 @pytest.mark.slow

@@ -736,7 +736,7 @@ def test_rests_within_the_limits_of_joints_are_counted(reach: float) -> None:
     ]
     inside = sum(bool(np.all(np.abs(each) <= reach)) for each in turns)
     assert 0 < inside < len(turns)
-    (told,) = [line.strip() for line in text(found).splitlines() if "within all limits" in line]
+    (told,) = [line.strip() for line in text(found).splitlines() if "within all joint limits" in line]
     alone = inside == 1
     assert told == f"within all joint limits: {inside} of these {len(turns)}" + " (the goal only)" * alone
 
