@@ -213,7 +213,7 @@ def test_a_long_silence_has_its_bar():
     assert re.search(r"step 1 \d:\d\d:\d\d", re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown))
     quiet = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert (quiet.stdout, quiet.stderr) == ("done\n", "")
-    code = "import hrsynth.cli.progress as progress\nprogress.SILENT = 0.3\n" + code
+    code = "import hrsynth.cli.progress as progress\nprogress.PROGRESS_LINE_INTERVAL_S = 0.3\n" + code
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert told.stdout == "done\n"
     assert 1 <= len(told.stderr.splitlines()) <= 3

@@ -78,7 +78,7 @@ def talk(folder: Path, arguments: list[str], answers: list[str]) -> tuple[int, s
 
 def repeated(shown: str, folder: Path) -> None:
     """Run the command that was printed."""
-    words = shlex.split(shown.rpartition("without dialog: ")[2].strip().splitlines()[0])
+    words = shlex.split(shown.rpartition("dialog: ")[2].strip().splitlines()[0])
     assert words[0] == "hrsynth"
     subprocess.run(
         [sys.executable, "-m", *words], cwd=folder, check=True, capture_output=True, stdin=subprocess.DEVNULL
@@ -91,8 +91,8 @@ def test_a_dialog_closes_a_loop_and_its_command_writes_the_same_bytes(tmp_path: 
     answers = ["7", "frog", "bar_end:frog", "1", "", "99", "bar", "nobody", "a", "so", "yes"]
     status, shown = talk(tmp_path, ["import", "open.urdf", "-o", "closed.urdf"], answers)
     assert status == 0, shown
-    assert "rocker_end:bar_end (0 mm apart)" in shown
-    for said in ("numbers go from 1 to", "--close", "no such link", "there is no such name"):
+    assert "rocker_end:bar_end (0 mm)" in shown
+    for said in ("numbers go from 1 to", "--close", "no such link", "unknown name"):
         assert said in shown
     assert "Traceback" not in shown
     robot = load(tmp_path / "closed.urdf")

@@ -40,7 +40,7 @@ QUICK = {
     ],
     "aspects": ["3rrr_m1 --observe 2,1,3"],
     "path": ["quattro --observe 1,4 --start x=0.05 --goal x=-0.05,phi=20deg", "3rps --start z=0.5 --goal z=0.51"],
-    "equilibria": ["rrrrr_m1 --at x=0,y=0.2", "rprpr_m1 --at x=0 --complete"],
+    "equilibria": ["rrrrr_m1 --goal x=0,y=0.2", "rprpr_m1 --goal x=0 --complete"],
     "servo": [
         "rrrrr_m1 --start x=0,y=0.2 --goal x=0.02,y=0.22",
         "rrrrr_m1 --start x=0,y=0.2 --goal x=0.02,y=0.22 --noise 0.1deg --time 3",
