@@ -88,7 +88,7 @@ def repeated(shown: str, folder: Path) -> None:
 @pytest.mark.slow
 def test_a_dialog_closes_a_loop_and_its_command_writes_the_same_bytes(tmp_path: Path):
     told_of(tmp_path)
-    answers = ["7", "frog", "bar_end:frog", "1", "", "99", "bar", "nobody", "a", "so", "yes"]
+    answers = ["7", "frog", "bar_end:frog", "1", "", "99", "bar", "nobody", "a", "these", "yes"]
     status, shown = talk(tmp_path, ["import", "open.urdf", "-o", "closed.urdf"], answers)
     assert status == 0, shown
     assert "rocker_end:bar_end (0 mm)" in shown
