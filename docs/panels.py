@@ -141,10 +141,10 @@ def shown(page: Any) -> Iterator[str]:
     slider.focus()
     for _ in range(12):
         slider.press("ArrowRight")
-    page.get_by_label("Drag the platform in the picture").check()
+    page.get_by_label("Drag the platform in the 3D view").check()
     settled(page)
     yield "move"
-    page.get_by_label("Drag the platform in the picture").uncheck()
+    page.get_by_label("Drag the platform in the 3D view").uncheck()
     page.get_by_role("radio", name="Side by side").check()
     yield panel(page, "legs")
     boxes = page.locator(".legs input:checked")
