@@ -391,7 +391,9 @@ def test_sets_of_points_are_ranked_by_what_attracts_their_loops(tmp_path: Path) 
     assert [len(kinds or ()) for kinds in others.values()] == [0, 0, 1, 1]
     assert all(("point_5" in legs) is not bool(kinds) for legs, kinds in others.items())
     assert tuple(f"point_{number}" for number in (1, 2, 3, 4)) in others
-    assert all("directions of segments only" in each.equilibria.why for each in found.kept if each.equilibria is not None)
+    assert all(
+        "directions of segments only" in each.equilibria.why for each in found.kept if each.equilibria is not None
+    )
     worst = [each.errors.position.largest for each in found.kept if each.errors is not None]
     assert worst != sorted(worst)
 

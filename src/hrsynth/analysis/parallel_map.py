@@ -72,7 +72,7 @@ def map_robots(
     Examples
     --------
     >>> hrsynth.map_robots("check", ["3rrr_m1"], poses=["x=0,phi=0", "x=0.01,phi=0"], legs=["1,2", "all"], jobs=1)[0]
-    <Check: 3rrr_m1, observing 1, 2: x=0,y=0,z=0,phi=0deg regular, observes 2 of 3 dof>
+    <Check: 3rrr_m1, observing 1, 2: x=0,y=-0.015,z=0,phi=0deg regular, observes 2 of 3 dof>
     """
     function: Callable[..., Any] = _find_function(analysis)
     if errors not in (RAISE, KEEP):

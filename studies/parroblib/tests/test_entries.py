@@ -66,8 +66,8 @@ def test_the_command_line(tables: Path, tmp_path: Path, capsys: pytest.CaptureFi
     assert (entry["key"], entry["hidden"], entry["group"]) == ("P3RRR1G1P1", "3-PiR*R", "2T1R")
     assert run_command(["catalog", "show", "P3RRR1G1P1", "--catalog", str(kept)]) == 0
     out = capsys.readouterr().out
-    assert "choices       joint 1 of each leg: 3" in out
-    assert "watched link" not in out
+    assert "motor choices  joint 1 of each leg: 3" in out
+    assert "observed link" not in out
     assert main(["robot", str(tables), "P3RRR1G1P1", "-o", str(robot)]) == 0
     assert run_command(["derive", str(robot), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["verdict"] == "controllable"

@@ -159,7 +159,7 @@ def test_rounded_directions_of_observe_are_those_of_segments(tmp_path: Path):
     seen = ObservedRobot.of(robot, samples=3).observed
     path = exported(of_hinges(replace(robot, observations=tuple(seen))), tmp_path / "robot.urdf", 5)
     found = load(path)
-    assert [note.text for note in found.notes if note.text.endswith("watched directions of leg 1, of leg 2, of leg 3")]
+    assert [note.text for note in found.notes if note.text.endswith("observed directions of leg 1, of leg 2, of leg 3")]
     balls = reduce_to_normal_form(found).mechanism
     for one, two in zip(found.observations, seen, strict=True):
         assert isinstance(one, Direction)
