@@ -25,7 +25,7 @@ DRAWN = {
     "modes": ["modes", "3rrr_m1"],
     "aspects": ["aspects", "3rrr_m1", "--observe", "2,1,3"],
     "accuracy": ["accuracy", "rrrrr_m1", "--cone", "0.1deg", *GRID],
-    "equilibria": ["equilibria", "prrrp_m1", "--at", "mode:1"],
+    "equilibria": ["equilibria", "prrrp_m1", "--goal", "mode:1"],
     "basins": ["basins", "rrrrr_m1", "--goal", "x=0.02,y=0.24", "--grid", "x=0.01:0.02:2,y=0.24", "--jobs", "1"],
     "servo": ["servo", "rrrrr_m1", "--start", "x=0,y=0.2", "--goal", "x=0.02,y=0.22"],
     "singularities": ["singularities", "rrrrr_m1", "--points", "5", "--steps", "5"],

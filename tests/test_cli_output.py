@@ -206,6 +206,6 @@ def test_without_posix_one_line_names_what_does_not_work(asked: list[str], needs
         assert (run.returncode, run.stderr) == (0, "")
     else:
         (line,) = run.stderr.splitlines()
-        assert "needs a POSIX system" in line
+        assert "of POSIX systems. Use Linux" in line
         assert needs in line
         assert run.returncode == 3

@@ -28,7 +28,7 @@ ASKED: dict[str, tuple[Any, ...]] = {
     "dof": (3, 2, 9),
     "motion": ("3T", "2T1R"),
     "verdict": ("partially controllable", "controllable"),
-    "sensors": ("3point", "3point'"),
+    "sensor": ("3point", "3point'"),
     "group": ("mixed", "planar"),
     "base_motors": (True, False),
     "fewest": (2, 0),

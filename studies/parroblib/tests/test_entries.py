@@ -81,7 +81,7 @@ def test_the_command_line(tables: Path, tmp_path: Path, capsys: pytest.CaptureFi
         assert err.count("\n") == 1
     for command, said in (
         (["show", "P3RRR1G1P1", "--catalog", str(kept), "-o", str(robot)], "parroblib robot"),
-        (["site", "--catalog", str(kept), "-o", str(tmp_path / "site")], "no pages are made"),
+        (["site", "--catalog", str(kept), "-o", str(tmp_path / "site")], "no pages for published robots"),
     ):
         assert run_command(["catalog", *command]) == 2
         assert said in (err := capsys.readouterr().err)

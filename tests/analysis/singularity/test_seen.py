@@ -156,7 +156,7 @@ def test_closed_conditions(sensor: list[str], words: str, expression: str) -> No
             "gough_stewart",
             EYE,
             [x.replace("image_line", "edge") + "/0.005" for x in LINES],
-            "feet of its perpendiculars",
+            "footpoints of its perpendiculars",
         ),
         ("gough_stewart", EYE, ["circle:platform@0.1,0,0/1,0,0", POINTS[1]], "leaves B1 fixed and moves B2 along r2"),
         (
