@@ -129,7 +129,7 @@ def convert(target: str | None, output: str | None, to: str | None, meshes: str,
         format_record("convert", mechanism, fields)
         if json
         else f"{mechanism.name} with {fields['links']} links and {fields['joints']} joints, platform "
-        f"{mechanism.platform_words}, written to {' and '.join(files)}."
+        f"{mechanism.platform_words}, is written to {' and '.join(files)}."
     )
 
 

@@ -87,7 +87,7 @@ def run_import(target: str, observe: str | None, yes: bool, view: bool, json: bo
     else:
         print_text(
             f"{mechanism.name} with {len(mechanism.links)} links and {len(mechanism.joints)} joints, platform "
-            f"{mechanism.platform_words}, written to {target}.\nSame without dialog: {again}"
+            f"{mechanism.platform_words}, is written to {target}.\nSame without dialog: {again}"
         )
 
 
