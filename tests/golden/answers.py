@@ -147,7 +147,7 @@ def cases() -> Iterator[Case]:
             )
     for name, argv in PICTURES.items():
         yield Case("picture", name, (*argv, "-o", "{folder}/picture.png"))
-    words = sorted(each["word"] for each in catalog() if "refused" not in each)
+    words = sorted(each["key"] for each in catalog() if "refused" not in each)
     for word in random.Random(SEED).sample(words, ENTRIES):
         yield Case("entry", word)
 
