@@ -97,6 +97,8 @@ class Rule(Generic[Place, Found]):
     keeps: tuple[str, ...] = ()
     """Sufficient conditions, in words, under which ρ is preserved at singular configurations too (docs/pages/theory.md,
     section 4); empty if none is needed."""
+    rank: int = 0
+    """Order within the stage: a lower rank is tried first."""
 
     def proposals(
         self, state: State, evidence: Evidence, leg: str = "", *, waive: bool = False

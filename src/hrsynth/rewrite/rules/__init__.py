@@ -13,11 +13,11 @@ from ..rule import Rule, Stage
 
 @cache
 def list_rules(*stages: Stage) -> tuple[Rule[Any, Any], ...]:
-    """Return the rules of some stages (default: all), stage by stage, in each by descending names of their files."""
-    found = list(_find_rules())
+    """Return the rules of some stages (default: all), stage by stage, in each by ``rank`` and name."""
+    found = sorted(_find_rules(), key=lambda rule: (rule.rank, rule.name))
     return tuple(rule for stage in stages or Stage for rule in found if rule.stage is stage)
 
 
 def _find_rules() -> Iterator[Rule[Any, Any]]:
-    for module in sorted(iter_modules(__path__), key=lambda module: module.name, reverse=True):
+    for module in iter_modules(__path__):
         yield import_module(f"{__name__}.{module.name}").RULE

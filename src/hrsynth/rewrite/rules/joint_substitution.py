@@ -113,5 +113,5 @@ def apply(state: State, found: Substitution | None) -> State:
 
 
 RULE = Rule(
-    "joint substitution", "MMT 3.2, Fig. 2(b)", Stage.JOINT, find, apply, list_chain_places, keeps=(LOOPS, AXES)
+    "joint substitution", "MMT 3.2, Fig. 2(b)", Stage.JOINT, find, apply, list_chain_places, keeps=(LOOPS, AXES), rank=1
 )
