@@ -190,6 +190,19 @@ def test_a_how_to_page_is_one_task_of_at_most_600_words(path: Path):
     assert len(text.split()) <= TASK
 
 
+def test_constants_that_docstrings_name_are_there():
+    """A renamed constant takes its mentions along."""
+    texts = {path: path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py")}
+    known = {name for text in texts.values() for name in re.findall(r"(?<!`)\b[A-Z]\w*\b(?!`)", text)}
+    named = [
+        f"{path.relative_to(PACKAGE)}: {name}"
+        for path, text in texts.items()
+        for name in re.findall(r"``(?:\w+\.)*([A-Z][A-Z0-9]*_[A-Z0-9_]+)``", text)
+        if name not in known
+    ]
+    assert named == []
+
+
 PUBLIC = [name for name in hrsynth.__all__ if callable(getattr(hrsynth, name)) and not name.startswith("_")]
 
 

@@ -187,9 +187,11 @@ CONTINUOUS_FAMILY_STEP_MAX = 0.02
 CURVATURE_DIFFERENCE_STEP_MAX = 1e-4
 """Step (characteristic lengths, radians) of the differences of such a slope."""
 SNAP_DISTANCE_MAX = 1e-5
-"""Distance (characteristic lengths) up to which joint centres are snapped, if the next one is ``RANK_GAP`` larger."""
+"""Distance (characteristic lengths) up to which joint centres are snapped, if the next one is ``RANK_GAP_MIN``
+larger."""
 SOLUTION_DISTANCE_MAX = 1e7
-"""Distance (characteristic lengths) beyond which a solution is at infinity, if the next one is ``RANK_GAP`` nearer."""
+"""Distance (characteristic lengths) beyond which a solution is at infinity, if the next one is ``RANK_GAP_MIN``
+nearer."""
 INDEPENDENT_PLANES_SINE_MIN = 1e-3
 """Least sine between a plane's normal and the span of the other normals that determine the position."""
 INDEPENDENT_RATES_MIN = 1e-6

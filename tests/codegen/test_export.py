@@ -382,7 +382,7 @@ def test_what_is_refused() -> None:
 
 
 def test_what_is_watched_is_refused_before_the_proof(monkeypatch: pytest.MonkeyPatch) -> None:
-    from hrsynth.description.observation_text import add_observations, parse_see
+    from hrsynth.description.observation_text import add_observations, parse_sensor
 
     monkeypatch.setattr("hrsynth.codegen.export.branch", lambda *_: pytest.fail("the proof has begun"))
     robot = four_bar()
@@ -393,7 +393,7 @@ def test_what_is_watched_is_refused_before_the_proof(monkeypatch: pytest.MonkeyP
         with pytest.raises(BadRequest, match=match):
             export(robot, **wrong)
     with pytest.raises(BadRequest, match="directions of segments only: got 'point point_1'"):
-        export(add_observations(robot, [parse_see(f"point:{robot.platform}@0,0,0.1", [])]))
+        export(add_observations(robot, [parse_sensor(f"point:{robot.platform}@0,0,0.1", [])]))
 
 
 SMALL = {"3rrr_m1": 0.02, "3prr_m1": 0.02, "rrrrr_m2": 0.05, "prrrp_m1": 0.05, "3rps": 0.01, "3rpr_m1": 0.02}

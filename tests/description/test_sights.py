@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.cli import run_command
 from hrsynth.description import build_spanning_mechanism, load, native, save
-from hrsynth.description.observation_text import add_observations, parse_camera, parse_see
+from hrsynth.description.observation_text import add_observations, parse_camera, parse_sensor
 from hrsynth.errors import BadRequest, BadRobotFile
 from hrsynth.geometry.vectors import build_pose
 from hrsynth.mechanism.cameras import CameraObservation, NamedCamera
@@ -50,13 +50,13 @@ def seeing_all(robot: str, rng: np.random.Generator) -> Mechanism:
     specs = []
     for word, kind in list_kinds().items():
         if kind is Encoder:
-            specs.append(parse_see(f"encoder:{joint}", ["eye"]))
+            specs.append(parse_sensor(f"encoder:{joint}", ["eye"]))
             continue
         text = f"eye={word}:{rng.choice(links)}" if word != "inclination" else f"{word}:{mechanism.platform}"
         for name, vector in (("at", rng.normal(size=3)), ("axis", random_direction(rng))):
             if name in kind.needs:
                 text += ("@" if name == "at" else "/") + ",".join(map(repr, vector.tolist()))
-        specs.append(parse_see(text + f"/{'-' * (word == 'edge')}0.02" * ("radius" in kind.needs), []))
+        specs.append(parse_sensor(text + f"/{'-' * (word == 'edge')}0.02" * ("radius" in kind.needs), []))
     seen = replace(specs[0], camera="the hand", link=mechanism.base, leg="seen by the hand")
     return add_observations(mechanism, [*specs, seen], cameras)
 
@@ -217,7 +217,7 @@ def test_what_is_wrong_on_the_command_line_is_one_line(
 def test_commands_that_know_segments_only_say_so(
     command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    save(add_observations(load("delta"), [parse_see("point:platform@0,0,0.1", [])]), tmp_path / "delta.urdf")
+    save(add_observations(load("delta"), [parse_sensor("point:platform@0,0,0.1", [])]), tmp_path / "delta.urdf")
     words = ["--start", "x=0", "--goal", "x=0.01", "--dynamics"]
     assert run_command([command, str(tmp_path / "delta.urdf"), *words]) == 2
     assert "supports directions of segments only: got 'point point_1'" in capsys.readouterr().err
@@ -235,7 +235,7 @@ def test_commands_that_know_segments_only_say_so(
     ],
 )
 def test_commands_read_what_a_file_observes(words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    sights = [parse_see(text, ["eye"]) for text in ("point:platform@0,0,0.1", "distance:platform@0,0,0.1")]
+    sights = [parse_sensor(text, ["eye"]) for text in ("point:platform@0,0,0.1", "distance:platform@0,0,0.1")]
     below = parse_camera("eye=base@0,0,0/180deg,0,0")
     save(add_observations(load("delta"), sights, [below]), tmp_path / "delta.urdf")
     command, *more = words.split()
@@ -285,7 +285,7 @@ def test_names_with_slashes_and_equals_signs_are_asked_for() -> None:
         (f"inclination:{name}/0,0,1", name, None, (0, 0, 1)),
         (f"encoder:{name}", name, None, None),
     ):
-        spec = parse_see(text, [])
+        spec = parse_sensor(text, [])
         assert (spec.link, spec.at, spec.axis, spec.camera) == (link, at, axis, "eye" if "eye" in text else None)
 
 
@@ -297,7 +297,7 @@ def test_what_a_file_lists_is_watched_and_can_be_chosen(tmp_path: Path) -> None:
     assert [o.leg for o in robot.observations] == ["point_1", "point_2"]
     assert [o.line for o in robot.observations] == [6, 7]
     with pytest.raises(BadRequest, match="world"):
-        parse_see("hand=point:world", [])
+        parse_sensor("hand=point:world", [])
 
 
 def test_every_element_is_documented() -> None:

@@ -32,7 +32,7 @@ from .observed import (
     ObservedRobot,
     RobotLike,
     Seed,
-    SeeLike,
+    SensorLike,
     normalise_texts,
     read_robot,
     restrict_samples,
@@ -260,9 +260,9 @@ def advise(
     observe: LegsLike = None,
     camera: CameraLike = None,
     *,
-    sensor: SeeLike = None,
+    sensor: SensorLike = None,
     candidate_sensor: Annotated[
-        SeeLike,
+        SensorLike,
         option(
             "What could be observed in addition, as for --sensor; without a point, such as "
             "point:plate, several points of that link; separate more by commas, or repeat.",
@@ -286,14 +286,8 @@ def advise(
 
     Parameters
     ----------
-    robot
-        Mechanism, observed robot, path of a file, name of a shipped robot, or ``example:NAME``.
-    observe
-        Leg labels or link names; default: what the file observes, else all legs.
-    camera
-        Link that carries the camera (default: the base), or named cameras ``NAME=LINK@x,y,z/r,p,y`` (m, rad).
-    sensor
-        Other observations, ``[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius`` (m, link frame).
+    robot, observe, camera, sensor
+        Robot and observations, as for ``derive``.
     candidate_sensor
         Further candidates, texts as for ``sensor``; without a point, ``point:plate``, several points of that link.
     cost

@@ -43,7 +43,7 @@ from .observed import (
     ObservedRobot,
     RobotLike,
     Seed,
-    SeeLike,
+    SensorLike,
 )
 from .pose_requests import require_platform, solve_requested_poses
 from .singularity_indices import Redundancy, find_generic_rows, list_redundant
@@ -253,7 +253,7 @@ def check(
     observe: LegsLike = None,
     camera: CameraLike = None,
     *,
-    sensor: SeeLike = None,
+    sensor: SensorLike = None,
     at: Annotated[
         PoseLike | Iterable[PoseLike],
         option(f"A pose, such as x=0.02,y=0.1,z=-0.7,phi=10deg; {POSES}", "POSE", kind=list[str]),
@@ -268,14 +268,8 @@ def check(
 
     Parameters
     ----------
-    robot
-        Mechanism, observed robot, path of a file, name of a shipped robot, or ``example:NAME``.
-    observe
-        Leg labels or link names; default: what the file observes, else all legs.
-    camera
-        Link that carries the camera (default: the base), or named cameras ``NAME=LINK@x,y,z/r,p,y`` (m, rad).
-    sensor
-        Other observations, ``[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius`` (m, link frame).
+    robot, observe, camera, sensor
+        Robot and observations, as for ``derive``.
     at
         Poses (m, rad, base coordinates); default: the zero configuration.
     grid

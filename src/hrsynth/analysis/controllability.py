@@ -26,7 +26,7 @@ from .observed import (
     OtherMode,
     RobotLike,
     Seed,
-    SeeLike,
+    SensorLike,
     restrict_samples,
 )
 from .pose_requests import observe as observed
@@ -152,7 +152,7 @@ def legs(
     camera: CameraLike = None,
     *,
     observe: LegsLike = None,
-    sensor: SeeLike = None,
+    sensor: SensorLike = None,
     at: BeginPose = None,
     seed: Seed = 0,
 ) -> Legs:

@@ -43,7 +43,7 @@ from .observed import (
     OtherMode,
     RobotLike,
     Seed,
-    SeeLike,
+    SensorLike,
 )
 from .pose_requests import observe as observed_robot
 from .verdict import Verdict, compute_verdict
@@ -193,7 +193,7 @@ def derive(
     observe: LegsLike = None,
     camera: CameraLike = None,
     *,
-    sensor: SeeLike = None,
+    sensor: SensorLike = None,
     at: BeginPose = None,
     form: Annotated[
         str,

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..budgets import CACHED_OBSERVED_ROBOTS_COUNT
 from ..description import load
-from ..description.observation_text import CAMERA, SEE, ObservationSpec, add_observations, parse_camera, parse_see
+from ..description.observation_text import CAMERA, SENSOR, ObservationSpec, add_observations, parse_camera, parse_sensor
 from ..errors import BadMechanism, BadRequest, HrsynthError, NoSegment, SamplingFailure
 from ..geometry.ranks import compute_range_bases
 from ..kinematics.configuration import ClosedConfiguration
@@ -147,8 +147,8 @@ class ObservedRobot(Value):
         observe: LegsLike = None,
         camera: CameraLike = None,
         *,
-        sensor: SeeLike = None,
-        candidate_sensor: SeeLike = None,
+        sensor: SensorLike = None,
+        candidate_sensor: SensorLike = None,
         samples: int = GENERIC_SAMPLES_COUNT,
         seed: int = 0,
         driven: bool = False,
@@ -398,7 +398,7 @@ CameraLike = Annotated[
     ),
 ]
 """The link that carries the camera, or ``NAME=LINK@x,y,z/r,p,y``, or several of them."""
-SeeLike = Annotated[
+SensorLike = Annotated[
     str | Iterable[str] | None,
     option(
         "What else is observed: circle, depth, direction, distance, edge, edges, encoder, image_circle, "
@@ -477,7 +477,7 @@ def normalise_names(given: LegsLike) -> tuple[str, ...] | None:
 
 
 def list_requested_legs(
-    robot: Mechanism | ObservedRobot, observe: LegsLike, sensor: SeeLike = None
+    robot: Mechanism | ObservedRobot, observe: LegsLike, sensor: SensorLike = None
 ) -> tuple[str, ...] | None:
     """Return :func:`normalise_names`, but None for all legs if only segments are observed: the same request in one
     form."""
@@ -496,7 +496,7 @@ def normalise_texts(given: str | Iterable[str] | None) -> tuple[str, ...]:
         else (given,)
     )
     if not all(isinstance(each, str) for each in every):
-        raise BadRequest("--camera, --sensor", given, f"texts such as {SEE}, or {CAMERA}")
+        raise BadRequest("--camera, --sensor", given, f"texts such as {SENSOR}, or {CAMERA}")
     return every
 
 
@@ -597,7 +597,7 @@ def _add_sensors(
 
 def _parse_spec(option: str, text: str, eyes: Sequence[str]) -> ObservationSpec:
     try:
-        return parse_see(text, eyes)
+        return parse_sensor(text, eyes)
     except BadRequest as error:
         raise BadRequest(
             error.problem.replace("--sensor", option, 1), error.got, error.expected, remedy=error.remedy

@@ -17,7 +17,7 @@ from ..mechanism.pose import AskedPose, JointPose, ModeNumber, Pose, PoseLike, p
 from ..options import require_range
 from ..results import with_spelling
 from ..tolerances import PRINTED_POSE_TOL
-from .observed import GENERIC_SAMPLES_COUNT, CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, read_robot
+from .observed import GENERIC_SAMPLES_COUNT, CameraLike, LegsLike, ObservedRobot, RobotLike, SensorLike, read_robot
 
 if TYPE_CHECKING:
     from .modes.modes import AssemblyModes
@@ -29,7 +29,7 @@ def observe(
     legs: LegsLike = None,
     camera: CameraLike = None,
     *,
-    sensor: SeeLike = None,
+    sensor: SensorLike = None,
     at: PoseLike | None = None,
     samples: int = GENERIC_SAMPLES_COUNT,
     seed: int = 0,

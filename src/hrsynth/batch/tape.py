@@ -217,8 +217,8 @@ class Tape:
         return found
 
     def lanes(self, stores: Sequence[Store], live: int | None = None) -> list[str]:
-        """Lines on ``LANES`` poses side by side: place p of lane i is ``m[LANES p + i]``. A lane in which place
-        ``live`` is not positive keeps what it has."""
+        """Lines on ``TAPE_LANES_COUNT`` poses side by side: place p of lane i is ``m[LANES p + i]``. A lane in which
+        place ``live`` is not positive keeps what it has."""
         before: list[str] = []
         inside = [] if live is None else [f"live = m[i + {TAPE_LANES_COUNT * live}] > 0.0"]
         fixed = self.are_constant()

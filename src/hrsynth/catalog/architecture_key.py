@@ -30,7 +30,7 @@ n q      in a U: normal to its other axis, and (n) to the line of centres next t
 
 The canonical key has its legs sorted, first as if they had no motors (a motor changes no leg's label), names letters
 of the same kind in the order of the leg, and drops the ``!`` of a default segment. It is stable: a new
-meaning changes ``VERSION``.
+meaning changes ``ARCHITECTURE_KEY_VERSION``.
 """
 
 from __future__ import annotations

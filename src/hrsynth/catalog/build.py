@@ -78,7 +78,8 @@ def remove_motors(word: str) -> str:
 
 
 def make_records(entry: Callable[[str], dict[str, Any]], group: str, words: Iterable[str]) -> Made:
-    """Compute the lines of keys; a refused entry gives the reason. Raises ``Stopped`` for an internal error."""
+    """Compute the lines of keys; a refused entry gives the reason. Raises ``WorkInterruption`` for an internal
+    error."""
     return [(word, format_line({**_build_entry(entry, word), "key": word, "group": group})) for word in words]
 
 

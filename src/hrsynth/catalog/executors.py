@@ -114,7 +114,8 @@ def _wait_for_parts(client: Any, waiting: set[Any]) -> tuple[set[Any], set[Any]]
 
 
 def _take_result(future: Any) -> Made:
-    """Return the result of a part; other errors than ``Stopped`` and lost connections are those of the workers."""
+    """Return the result of a part; other errors than ``WorkInterruption`` and lost connections are those of the
+    workers."""
     from concurrent.futures import CancelledError
 
     from distributed.scheduler import KilledWorker
@@ -137,7 +138,7 @@ def _take_result(future: Any) -> Made:
 
 
 def _require_alive(client: Any) -> None:
-    """Raise ``Stopped`` where the cluster no longer answers, or has no workers left."""
+    """Raise ``WorkInterruption`` where the cluster no longer answers, or has no workers left."""
     try:
         workers = client.nthreads()
     except (RuntimeError, ValueError):

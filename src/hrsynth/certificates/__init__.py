@@ -75,7 +75,7 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
     source
         Certificate, or path of its file.
     robot
-        Robot whose geometry must be that of the certificate, to ``SAME_RELATION`` characteristic lengths.
+        Robot whose geometry must be that of the certificate, to ``RELATION_ANGLE_TOL`` characteristic lengths.
 
     Returns
     -------

@@ -26,7 +26,7 @@ from ..mechanism.observations.inclination import Inclination
 from ..mechanism.sensors import make_encoders
 from . import numerals
 
-SEE = "[CAMERA=]KIND:LINK[@x,y,z][/dx,dy,dz][/radius]"
+SENSOR = "[CAMERA=]KIND:LINK[@x,y,z][/dx,dy,dz][/radius]"
 CAMERA = "NAME=LINK[@x,y,z[/roll,pitch,yaw[/focal[,width,height]]]]"
 OFFERED = (
     ((0.5, 0.1, 0.2), (0.0, 0.0, 1.0)),
@@ -121,12 +121,14 @@ def _find_camera_name(mechanism: Mechanism, seen: Observation) -> str | None:
     raise BadRequest(f"{seen.kind} {seen.leg!r} is seen from a link without a named camera", seen.seen_from)
 
 
-def parse_see(text: str, cameras: Sequence[str]) -> ObservationSpec:
+def parse_sensor(text: str, cameras: Sequence[str]) -> ObservationSpec:
     """Return the observation of a word of ``--sensor``; without a camera's name, by the only one of ``cameras``."""
     head, given, place = text.partition(":")
     camera, named, kind = head.rpartition("=")
     if not given or (named and not camera.strip()):
-        raise BadRequest(*(("--sensor", text) if not given else (f"--sensor {text}: the camera's name", camera)), SEE)
+        raise BadRequest(
+            *(("--sensor", text) if not given else (f"--sensor {text}: the camera's name", camera)), SENSOR
+        )
     needs = _list_needs(kind)
     # names of links and joints may have slashes: numbers follow the last @, or have commas
     if "at" in needs:
@@ -145,7 +147,7 @@ def parse_see(text: str, cameras: Sequence[str]) -> ObservationSpec:
     attributes = {"kind": kind, "joint" if "joint" in needs else "link": link or at}
     if "at" in needs:
         if not link:
-            raise BadRequest(f"--sensor {text}: point on the link", at, SEE)
+            raise BadRequest(f"--sensor {text}: point on the link", at, SENSOR)
         attributes["at"] = _parse_numbers(at, f"--sensor {text}")
     for name in ("axis", "radius"):
         if more and (name in needs or f"{name}?" in needs):
@@ -164,7 +166,7 @@ def parse_see(text: str, cameras: Sequence[str]) -> ObservationSpec:
         raise BadRequest(
             f"--sensor {text}: {error.problem}",
             error.got,
-            error.expected or (None if error.remedy else SEE),
+            error.expected or (None if error.remedy else SENSOR),
             remedy=error.remedy,
         ) from None
     return found

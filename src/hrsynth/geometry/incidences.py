@@ -35,7 +35,7 @@ class Sieve:
     def __init__(self) -> None:
         self.accepted, self.rejected = 0.0, float("inf")
         """The largest defect of a relation that is taken as held, and the smallest of one that is not, if it is less
-        than ``RANK_GAP`` tolerances."""
+        than ``RANK_GAP_MIN`` tolerances."""
         self.mixed: tuple[int, int] | None = None
         """Of a relation that holds at the first configuration and at some of the others: at how many, of how many."""
 

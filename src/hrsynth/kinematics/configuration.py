@@ -24,7 +24,7 @@ from .pinocchio_model import PinocchioModel
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ClosedConfiguration(Value):
-    """Configuration of a model whose loops are closed to ``tolerances.CLOSED``; ``q`` is read-only."""
+    """Configuration of a model whose loops are closed to ``tolerances.CLOSURE_RESIDUAL_TOL``; ``q`` is read-only."""
 
     model: PinocchioModel
     q: Array

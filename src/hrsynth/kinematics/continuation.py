@@ -230,7 +230,8 @@ def polish(here: ClosedConfiguration, goal: GuidedTask) -> ClosedConfiguration:
 
 def _find_fold(model: PinocchioModel, q: Array, goal: GuidedTask) -> Array:
     """Return the configuration on a fold of the path (the edge of the workspace) if ``q`` is not distinguishable from
-    it: where the smallest singular value of loops and goal vanishes, if the residual stays within ``SOLVED`` there."""
+    it: where the smallest singular value of loops and goal vanishes, if the residual stays within
+    ``CLOSURE_SOLVER_TOL`` there."""
     rows = stack_task(model, q, goal)[1]
     left, values, right = np.linalg.svd(rows, full_matrices=False)
     weak = np.nonzero((values < FOLD_SINGULAR_VALUE_TOL) & (values > HIDDEN_ROBOT_RESIDUAL_TOL))[0]

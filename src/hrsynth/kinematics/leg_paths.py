@@ -90,8 +90,8 @@ class MotionFactor:
 
 
 def list_leg_paths(decomposition: LegDecomposition, leg: Leg) -> Iterator[tuple[MotionFactor, ...]]:
-    """Yield the paths from the base to the link on which a leg ends, up to ``WAYS``, without those through a free
-    joint; if the platform is a point, any rotation about it is their last part."""
+    """Yield the paths from the base to the link on which a leg ends, up to ``LEG_PATHS_MAX``, without those through a
+    free joint; if the platform is a point, any rotation about it is their last part."""
     mechanism = decomposition.mechanism
     frame, point = mechanism.links[mechanism.platform].pose, decomposition.point
     last = () if point is None else (MotionFactor(False, transform(frame, point), None, ()),)

@@ -72,7 +72,7 @@ class Incidences:
     held: float = 0.0
     """Largest defect (sines, characteristic lengths) of an incidence that holds."""
     missed: float = float("inf")
-    """Smallest defect of one that does not, if it is at most ``RANK_GAP`` tolerances."""
+    """Smallest defect of one that does not, if it is at most ``RANK_GAP_MIN`` tolerances."""
 
     def members(self, number: int) -> str:
         """Return the joints with an axis in a class as a text."""

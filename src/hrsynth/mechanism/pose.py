@@ -432,7 +432,7 @@ def write_parts(parts: Mapping[str, tuple[float, ...]], degrees: bool = False) -
 
 
 def _write_number(value: float) -> str:
-    """Return six digits, and six decimals, so that a typed pose is the same to ``AS_PRINTED``."""
+    """Return six digits, and six decimals, so that a typed pose is the same to ``PRINTED_POSE_TOL``."""
     return f"{round(value, 6) + 0.0:.15g}" if abs(value) >= 1 else f"{round(value, 9) + 0.0:.6g}"
 
 

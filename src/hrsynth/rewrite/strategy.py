@@ -1,7 +1,7 @@
 """Strategies: the order in which rules are tried, every step checked for equivalence and recorded.
 
 A strategy is a function from a rewriting to a later one, as in term rewriting. ``chain`` runs strategies one after
-the other; ``each_leg`` tries the rules of some stages on legs and takes the first accepted proposal of each;
+the other; ``apply_to_each_leg`` tries the rules of some stages on legs and takes the first accepted proposal of each;
 ``choose_fewest_legs`` tries all proposals and continues from the one after which most legs can be removed. All share
 a limit of attempts.
 """
@@ -45,7 +45,7 @@ class Step(Record):
     """One attempt: the rule, the leg (None: all), whether it was accepted, why, and the angle if it was measured;
     ``state`` is what an accepted rewriting left behind, ``always`` whether the rule holds for every robot, ``keeps``
     where it keeps ρ at singular configurations too, ``bodies`` the links, besides the platform, whose twists must not
-    change, ``taken_back`` whether it served only for a proposal that was not kept."""
+    change, ``discarded`` whether it served only for a proposal that was not kept."""
 
     rule: Recorded[str]
     leg: Recorded[str | None]

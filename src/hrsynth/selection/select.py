@@ -27,7 +27,7 @@ from ..analysis.observed import (
     ObservedRobot,
     RobotLike,
     Seed,
-    SeeLike,
+    SensorLike,
     StartPose,
 )
 from ..analysis.pose_requests import solve_configurations
@@ -282,7 +282,7 @@ def select(
     camera: CameraLike = None,
     *,
     observe: LegsLike = None,
-    sensor: SeeLike = None,
+    sensor: SensorLike = None,
     start: StartPose,
     goal: Annotated[PoseLike, option("Goal pose.", "POSE")],
     cone: Annotated[

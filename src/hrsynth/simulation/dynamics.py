@@ -77,8 +77,8 @@ class DynamicSimulation:
         ]
 
     def run(self, loop: Loop, horizon: float) -> tuple[Run, Array]:
-        """Run until the error is below ``BENCH_SETTLED`` or ``horizon`` (s); also the displacement of the platform
-        since the start, as simulated, (4, 4)."""
+        """Run until the error is below ``DYNAMICS_SETTLED_ERROR_TOL`` or ``horizon`` (s); also the displacement of the
+        platform since the start, as simulated, (4, 4)."""
         mujoco = simulator("the dynamic simulation")
         model, data = self._model, mujoco.MjData(self._model)
         motors = [model.actuator(name).id for name in self._names]

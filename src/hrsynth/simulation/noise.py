@@ -20,8 +20,8 @@ NOISE_PERIOD_S = 0.04
 
 @dataclass(frozen=True, eq=False, repr=False)
 class NoiseSamples(Value):
-    """Random vectors in the unit ball, ``table`` (samples, k, 3), one of them each ``PERIOD``, linear in between, the
-    last one from then on."""
+    """Random vectors in the unit ball, ``table`` (samples, k, 3), one of them each ``NOISE_PERIOD_S``, linear in
+    between, the last one from then on."""
 
     table: Array
 

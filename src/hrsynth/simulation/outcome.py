@@ -149,7 +149,7 @@ class OutcomeClassifier(Value):
         )
 
     def is_at_pose(self, at: ClosedConfiguration, X: Array) -> bool:
-        """Return True if the platform of a configuration is at X (4, 4), to ``SAME_RELATION``."""
+        """Return True if the platform of a configuration is at X (4, 4), to ``RELATION_ANGLE_TOL``."""
         return self._is_same_pose(at.pose(self.setup.motion.link), X, self.setup.decomposition.point)
 
     def _is_same_pose(self, X: Array, other: Array, point: Array | None) -> bool:

@@ -143,7 +143,8 @@ class LegRenderer:
 
 @dataclass(frozen=True, eq=False)
 class RenderedImages:
-    """Directions computed from rendered images, one each ``noise.PERIOD``; in between their errors are constant."""
+    """Directions computed from rendered images, one each ``noise.NOISE_PERIOD_S``; in between their errors are
+    constant."""
 
     stage: LegRenderer
     _held: dict[int, Array] = field(default_factory=dict)

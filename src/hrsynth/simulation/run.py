@@ -59,7 +59,7 @@ class Run(Value):
     (``served``), a stable equilibrium was reached (``rest``), the command vanished where none was found (``poised``), a
     joint reached its limit (``limit``), an observation left its camera's field of view (``unseen``), the loops' rank
     falls (``open``), the platform ran away (``away``), the time ran out (``time``), the integrator used its
-    ``RUN_EVALUATIONS`` configurations (``effort``), or it could not continue (``lost``)."""
+    ``RUN_EVALUATIONS_MAX`` configurations (``effort``), or it could not continue (``lost``)."""
 
     times: Array
     configurations: tuple[ClosedConfiguration, ...]

@@ -13,7 +13,7 @@ from ..analysis.accuracy.accuracy import require_full_observation
 from ..analysis.accuracy.measurement_bounds import IN_SIGHT
 from ..analysis.analysis_declaration import analysis
 from ..analysis.configuration_report import REGULAR, UNDECIDED, ConfigurationAnalysis
-from ..analysis.observed import POINTS, CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike, StartPose
+from ..analysis.observed import POINTS, CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SensorLike, StartPose
 from ..analysis.pose_requests import solve_configurations
 from ..budgets import RUN_DURATION_MAX_S, RUN_EVALUATIONS_MAX
 from ..errors import BadRequest, UndecidedRank
@@ -160,7 +160,7 @@ def servo(
     observe: LegsLike = None,
     camera: CameraLike = None,
     *,
-    sensor: SeeLike = None,
+    sensor: SensorLike = None,
     start: StartPose,
     goal: Annotated[PoseLike, option("Pose whose measured values are desired.", "POSE")],
     conditions: Conditions,

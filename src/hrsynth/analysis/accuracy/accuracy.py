@@ -18,7 +18,7 @@ from ...records import DEG, FLAT, As, Shown, recorded
 from ...results import Result
 from ...tolerances import FIRST_ORDER_POSE_ERROR_MAX
 from ..analysis_declaration import analysis
-from ..observed import POSES, UNLIMITED, CameraLike, LegsLike, NoiseLike, ObservedRobot, RobotLike, Seed, SeeLike
+from ..observed import POSES, UNLIMITED, CameraLike, LegsLike, NoiseLike, ObservedRobot, RobotLike, Seed, SensorLike
 from ..pose_requests import solve_configurations
 from ..verdict import compute_verdict
 from .error_map import ErrorMap, Mapper
@@ -133,7 +133,7 @@ def accuracy(
     observe: LegsLike = None,
     camera: CameraLike = None,
     *,
-    sensor: SeeLike = None,
+    sensor: SensorLike = None,
     cone: Annotated[
         Cones | None,
         option(
@@ -170,14 +170,8 @@ def accuracy(
 
     Parameters
     ----------
-    robot
-        Mechanism, observed robot, path of a file, name of a shipped robot, or ``example:NAME``.
-    observe
-        Leg labels or link names; default: what the file observes, else all legs.
-    camera
-        Link that carries the camera (default: the base), or named cameras ``NAME=LINK@x,y,z/r,p,y`` (m, rad).
-    sensor
-        Other observations, ``[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius`` (m, link frame).
+    robot, observe, camera, sensor
+        Robot and observations, as for ``derive``.
     cone
         Half-angle of the cones about the directions (rad, or text with ``deg``), for all or one per leg.
     noise

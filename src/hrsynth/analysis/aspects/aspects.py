@@ -24,7 +24,7 @@ from ...results import Result, Value
 from ...tolerances import HIDDEN_ROBOT_RESIDUAL_TOL
 from ..analysis_declaration import analysis
 from ..modes.modes import AssemblyModes, at_mode, modes
-from ..observed import CameraLike, LegsLike, RobotLike, Seed, SeeLike
+from ..observed import CameraLike, LegsLike, RobotLike, Seed, SensorLike
 from .path import PATH_INTERVALS_MAX, PathAnswer, PathPlanner
 from .singularity_slice import SingularitySlice, compute_singularity_slice
 from .three_cranks import CrankPlace, recognise_three_cranks
@@ -173,7 +173,7 @@ def aspects(
     observe: LegsLike = None,
     camera: CameraLike = None,
     *,
-    sensor: SeeLike = None,
+    sensor: SensorLike = None,
     at: Annotated[
         PoseLike | ClosedConfiguration | None,
         option(
@@ -194,7 +194,7 @@ def aspects(
     seed
         Seed of the random samples and of the road maps.
     budget
-        Largest number of intervals for one path; ``budgets.ATLAS_INTERVALS`` for all of them.
+        Largest number of intervals for one path; ``budgets.ASPECTS_INTERVALS_MAX`` for all of them.
 
     Returns
     -------

@@ -151,8 +151,8 @@ def prove(enclosure: ConditionEnclosure, way: PathSegment, budget: int) -> Proof
 
 
 def enclose_value(enclosure: ConditionEnclosure, p: Array, R: Array) -> tuple[bool, float]:
-    """Return whether all poses within ``tolerances.FOLLOWED`` of one are reached, and a bound of the value with its
-    sign: the value among them that is nearest to zero (0 if zero is among them)."""
+    """Return whether all poses within ``tolerances.HIDDEN_ROBOT_RESIDUAL_TOL`` of one are reached, and a bound of the
+    value with its sign: the value among them that is nearest to zero (0 if zero is among them)."""
     here = StraightSegment(p, R, np.zeros(3), np.zeros(3))
     reached, values = enclosure.at(*here.at(enclose_intervals([0.0], [0.0])))
     _, middle = enclosure.at(*here.at(np.zeros(1)))

@@ -27,7 +27,7 @@ from ...tolerances import CLOSURE_SOLVER_TOL, PRINTED_POSE_TOL, RANK_CUTOFF_FRAC
 from ..accuracy.measurement_bounds import find_invisible
 from ..analysis_declaration import analysis
 from ..measured import MeasuredRobot
-from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike, StartPose
+from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SensorLike, StartPose
 from ..pose_requests import solve_configurations
 from ..singularity.condition_check import compute_smallest_value, compute_smallest_values
 from .condition_enclosure import ConditionEnclosure, PathSegment, enclose_value, has_sign_change, is_beyond
@@ -223,7 +223,7 @@ class PathPlanner(Value):
         observe: LegsLike = None,
         camera: CameraLike = None,
         *,
-        sensor: SeeLike = None,
+        sensor: SensorLike = None,
         seed: int = 0,
     ) -> PathPlanner:
         """Return the planner of a robot, its condition from random samples of its motion."""
@@ -513,7 +513,7 @@ def path(
     observe: LegsLike = None,
     camera: CameraLike = None,
     *,
-    sensor: SeeLike = None,
+    sensor: SensorLike = None,
     start: StartPose,
     goal: Annotated[PoseLike, option("Goal pose; mode:2 is a mode with the directions at the start.", "POSE")],
     seed: Seed = 0,
@@ -550,10 +550,10 @@ def path(
     -----
     The condition is that of the real robot's velocity relation, which is the exact lift's (theory.md 3). A certified
     path encloses, by interval arithmetic, the condition's value away from zero, the reach of every leg and the limits
-    of R and P joints, for all poses within ``tolerances.FOLLOWED`` of the path. Legs may pass their limits into other
-    working modes (Type 1), but no rod length zero. All that is observed has a value on the path, in front of the
-    camera or not. Opposite signs of an expression, at the start and in all working modes of the goal that joint limits
-    allow, separate the two. If nothing can be enclosed, the straight path is sampled. Source: proofs.md 9.
+    of R and P joints, for all poses within ``tolerances.HIDDEN_ROBOT_RESIDUAL_TOL`` of the path. Legs may pass their
+    limits into other working modes (Type 1), but no rod length zero. All that is observed has a value on the path, in
+    front of the camera or not. Opposite signs of an expression, at the start and in all working modes of the goal that
+    joint limits allow, separate the two. If nothing can be enclosed, the straight path is sampled. Source: proofs.md 9.
 
     Both poses are reached from the zero configuration in its working mode. If small steps do not lead to a pose that is
     a mode of the other, it is the assembled mode that ``modes`` finds.

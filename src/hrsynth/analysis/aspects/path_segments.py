@@ -88,7 +88,8 @@ class StraightSegment(Value):
         return cls(*one, two[0] - one[0], convert_rotations_to_vectors(two[1] @ one[1].T))
 
     def at(self, fractions: Field) -> tuple[Field, Field]:
-        """Return poses (n, 3), (n, 3, 3) at fractions (n,); of balls, with all poses nearer than ``FOLLOWED``."""
+        """Return poses (n, 3), (n, 3, 3) at fractions (n,); of balls, with all poses nearer than
+        ``HIDDEN_ROBOT_RESIDUAL_TOL``."""
         p = self.p + fractions[:, None] * self.shift
         angle = float(np.linalg.norm(self.turn))
         R: Field = np.broadcast_to(self.R, (len(fractions), 3, 3))

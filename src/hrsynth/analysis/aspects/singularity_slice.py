@@ -45,7 +45,8 @@ Numbers = Sequence[Any] | NDArray[Any]
 class SectionPoint(Record, all_recorded=True):
     """Point of the surface: the rotation of the first crank's w₀ in the plane, that of the platform since the goal, and
     the directions of e₁, e₂ (rad). ``radius``: of the box that is proved to contain exactly one such point (rad,
-    characteristic lengths), for all geometries within ``tolerances.FOLLOWED``; None if it is not proved."""
+    characteristic lengths), for all geometries within ``tolerances.HIDDEN_ROBOT_RESIDUAL_TOL``; None if it is not
+    proved."""
 
     crank: float
     turn: Annotated[float, As("phi")]
@@ -168,8 +169,8 @@ class LockedLegSection:
 
 
 def compute_singularity_slice(robot: ThreeCranks, held: complex) -> SingularitySlice:
-    """Compute the curve, its cusps and its nodes: from a grid of ``budgets.SECTION_STEPS`` rotations of crank and
-    platform, enclosed where Krawczyk's operator proves them."""
+    """Compute the curve, its cusps and its nodes: from a grid of ``budgets.SLICE_GRID_STEPS_COUNT`` rotations of crank
+    and platform, enclosed where Krawczyk's operator proves them."""
     leg, thick = LockedLegSection(robot, held), LockedLegSection(robot, held, _convert_to_ball)
     traces = list(_trace_pieces(leg))
     cusps: list[tuple[Array, SectionPoint]] = []

@@ -90,9 +90,9 @@ class BranchLimit(Value, all_recorded=True):
 class BranchPart(Value):
     """Motors and the passive coordinates that follow from them alone, with the cells in which that is proved; ``cells``
     are connected to the zero configuration, which the first contains. ``asked``, ``proved``: boxes, low and high (n,)
-    each; ``share``: volume of all cells, as a share of the requested box; ``box_share`` that of ``proved``, the largest
-    box about the zero configuration that was found in their union. ``turns``: for each motor whose box is a whole turn
-    proved from end to end, whether the closure at the end is that of the beginning."""
+    each; ``share``: volume of all cells, as a share of the requested box; ``box_fraction`` that of ``proved``, the
+    largest box about the zero configuration that was found in their union. ``turns``: for each motor whose box is a
+    whole turn proved from end to end, whether the closure at the end is that of the beginning."""
 
     motors: Recorded[tuple[str, ...]]
     passive: Recorded[tuple[str, ...]]

@@ -75,9 +75,9 @@ class FixedForm(NamedTuple):
 
 
 def beyond(part: PoseSystem, balls: Within, far: Array, wanted: int) -> int:
-    """Count the solutions at infinity, or beyond ``FARTHEST`` for all input in the balls, that are enclosed and
-    distinct: near the ends ``far`` (m, 8) of paths, as (e, g). Other coordinates are tried until as many as ``wanted``
-    are."""
+    """Count the solutions at infinity, or beyond ``SOLUTION_DISTANCE_MAX`` for all input in the balls, that are
+    enclosed and distinct: near the ends ``far`` (m, 8) of paths, as (e, g). Other coordinates are tried until as many
+    as ``wanted`` are."""
     most = 0
     for number in range(1, ENDPOINT_COORDINATES_COUNT + 1):
         most = max(most, _enclose_infinity(part, balls, far, np.exp(1j * number * np.arange(1, 5) ** 2)))

@@ -29,7 +29,7 @@ from ...tolerances import MEASUREMENT_BOUND, NEAR_POSE_DIFFERENCE_TOL
 from ..analysis_declaration import analysis
 from ..formation import Formation
 from ..measured import MeasuredRobot
-from ..observed import POINTS, UNLIMITED, CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike
+from ..observed import POINTS, UNLIMITED, CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SensorLike
 from .assembly_mode import AssemblyMode, ModeReader, found_mode
 from .branches import Model
 from .carrying_leg_modes import solve_carried
@@ -251,7 +251,7 @@ def modes(
     observe: LegsLike = None,
     camera: CameraLike = None,
     *,
-    sensor: SeeLike = None,
+    sensor: SensorLike = None,
     at: Annotated[
         PoseLike | ClosedConfiguration | None,
         option(

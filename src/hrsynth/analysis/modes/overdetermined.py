@@ -177,9 +177,8 @@ class SnappedPoints:
 def snap_centres(system: System) -> tuple[System, tuple[SnappedPoints, ...]]:
     """Return a system with nearly coinciding centres snapped, and which were; its error grows by the distance moved.
 
-    Centres are snapped if the largest distance accepted (at most ``MEANT`` sizes) is below the smallest one rejected by
-    ``RANK_GAP``; raises ``GeometryAmbiguous`` if it is in between.
-    """
+    Centres are snapped if the largest distance accepted (at most ``SNAP_DISTANCE_MAX`` sizes) is below the smallest one
+    rejected by ``RANK_GAP_MIN``; raises ``GeometryAmbiguous`` if it is in between."""
     if system.as_written or not isinstance(system, Spatial):
         return system, ()
     spheres = [k for k, curve in enumerate(system.curves) if isinstance(curve, Sphere)]

@@ -188,8 +188,8 @@ class _Tips(SolutionEncloser):
 
 
 def _has_separate_far_boxes(part: PoseSystem, far: Sequence[Sequence[Any]]) -> bool:
-    """Return True if solutions of the rounded equations beyond ``FARTHEST`` are enclosed, each unknown in its own size,
-    no two in one box."""
+    """Return True if solutions of the rounded equations beyond ``SOLUTION_DISTANCE_MAX`` are enclosed, each unknown in
+    its own size, no two in one box."""
     from flint import ctx
 
     boxes, quadrics = list[list[Any]](), combine_quadrics(part.equations())
@@ -235,8 +235,8 @@ def _has_separate_boxes(
 
 
 def _is_pose(chart: PoseParametrization, box: Sequence[Any]) -> bool:
-    """Return True if all of a box are poses, of a rigid body nearer than ``FARTHEST``: |e|² below so many times
-    |e·e|."""
+    """Return True if all of a box are poses, of a rigid body nearer than ``SOLUTION_DISTANCE_MAX``: |e|² below so many
+    times |e·e|."""
     if chart.nonzero is None:
         return True
     ends, least = np.array([1, *box], dtype=object), float(chart.nonzero.value(box).abs_lower())

@@ -7,10 +7,9 @@ point three planes, and for two curves
 
     |tip₁ − tip₂|² w₁ w₂ = Q₁ w₂ + Q₂ w₁ − 2 N₁·N₂.
 
-Coordinates are counted in units of size·2⁻⁵². Directions that agree to ``PARALLEL`` are made equal, in a frame whose
-third axis is theirs: so circles in parallel planes meet at infinity exactly, and parallel lines stay parallel. The same
-builders give integers or, with what rounding and this may have changed as radius, arb balls.
-"""
+Coordinates are counted in units of size·2⁻⁵². Directions that agree to ``EXACT_PARALLEL_SINE_TOL`` are made equal, in a
+frame whose third axis is theirs: so circles in parallel planes meet at infinity exactly, and parallel lines stay
+parallel. The same builders give integers or, with what rounding and this may have changed as radius, arb balls."""
 
 from __future__ import annotations
 

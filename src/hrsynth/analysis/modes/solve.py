@@ -153,11 +153,11 @@ def solve(system: System, *, near: bool = True, goal: Array | None = None) -> Sy
     """List all modes of a system: the solutions of its first regular square part at which all tips fit.
 
     With redundant observation the ``goal``, coordinates of a pose at which all tips fit by construction, is
-    proved to be a mode; others are modes that fit if their residual is at most ``VANISHES`` and they are not excluded.
-    ``near`` are the poses with a residual up to ``NEAR_MODE`` where the sum of squares is stationary, from several
-    square parts (unless ``near`` is false).
-    Where no square part decides the pose, tips on surfaces are left to a solver that proposes poses: a homotopy for
-    a rigid body, else msolve (``MissingExtra`` where that is not installed).
+    proved to be a mode; others are modes that fit if their residual is at most ``LOCUS_DISTANCE_TOL`` and they are not
+    excluded. ``near`` are the poses with a residual up to ``NEAR_MODE_DISTANCE_MAX`` where the sum of squares is
+    stationary, from several square parts (unless ``near`` is false). Where no square part decides the pose, tips on
+    surfaces are left to a solver that proposes poses: a homotopy for a rigid body, else msolve (``MissingExtra`` where
+    that is not installed).
     """
     system, told = snap_centres(system)
     return replace(_solve(system, near, goal), snapped=told)

@@ -151,7 +151,7 @@ def _held_chain(
     at: ClosedConfiguration,
     end: Array | str,
 ) -> Chain:
-    """The chain to a leg's tip, its observations held; raises ``Underived``."""
+    """The chain to a leg's tip, its observations held; raises ``LocusDerivationFailure``."""
     own = [o for o in observation_model.observations if o.leg == leg.label]
     return chain(decomposition, decomposition.leg(leg.label), own, at, _value(leg.tip, at) * at.model.length, end)
 

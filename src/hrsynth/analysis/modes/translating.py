@@ -127,7 +127,7 @@ def met_normal(one: Curve, other: Reach) -> Array:
 
 
 def is_coplanar(one: Curve, other: Curve, size: float) -> bool:
-    """Return True if two curves lie in one plane, to ``VANISHES``."""
+    """Return True if two curves lie in one plane, to ``LOCUS_DISTANCE_TOL``."""
     between = (other.centre - one.centre) / size
     circles = [curve for curve in (one, other) if isinstance(curve, Circle)]
     lines = [curve.direction for curve in (one, other) if isinstance(curve, Line)]

@@ -26,7 +26,7 @@ from ...records import As, Number, Recorded, Shown, recorded
 from ...results import Value
 from ...tolerances import ON_PLANE, RELATION_ANGLE_TOL, SINGULAR_POSE_DISTANCE_TOL
 from ..measured import MeasuredRobot
-from ..observed import CameraLike, ObservedRobot, SeeLike
+from ..observed import CameraLike, ObservedRobot, SensorLike
 from .batch_spectrum import Quick
 from .condition_check import compute_smallest_value, compute_spectrum, descend
 from .rank_curve import PlaneOfPoses
@@ -78,7 +78,7 @@ def compute_locus(
     observe: Sequence[str] | str | None = None,
     camera: CameraLike = None,
     *,
-    sensor: SeeLike = None,
+    sensor: SensorLike = None,
     plane: Pose | str | None = None,
     steps: int = PLANE_SIDE_POSES_COUNT,
     seed: int = 0,
@@ -234,7 +234,7 @@ def _start_plane(
 
 def _find_plane_end(coarse: Grid, found: Array, axis: int, end: int, met: Callable[[Grid], NDArray[np.bool_]]) -> float:
     """Return the reached extent of a plane along one axis, to half a step of the coarse grid: ``found`` (2, 2) by it,
-    and thinner tips beyond, of which cells are ``CLOSER``."""
+    and thinner tips beyond, of which cells are ``BOUNDARY_REFINEMENT_COUNT``."""
     (_, along), (_, across) = coarse.axes[axis], coarse.axes[1 - axis]
     step, apart, last = (along[1] - along[0]) * (2 * end - 1), across[1] - across[0], float(found[axis, end])
     low, high = found[1 - axis]

@@ -24,7 +24,7 @@ from ...tolerances import CLOSURE_SOLVER_TOL
 from ..analysis_declaration import analysis
 from ..freedoms import Freedom, name_freedoms
 from ..measured import MeasuredRobot
-from ..observed import POINTS, CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike
+from ..observed import POINTS, CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SensorLike
 from ..verdict import Verdict
 from .condition_check import Agreement, compare_condition, compute_smallest_value
 
@@ -165,7 +165,7 @@ def singularities(
     observe: LegsLike = None,
     camera: CameraLike = None,
     *,
-    sensor: SeeLike = None,
+    sensor: SensorLike = None,
     real: Annotated[bool, option("Analyse the real robot with its motors instead of the hidden robot.")] = False,
     points: Annotated[
         int, option("Number of random poses at which the condition is checked.", low=1, high=10_000_000)
@@ -176,14 +176,8 @@ def singularities(
 
     Parameters
     ----------
-    robot
-        Mechanism, observed robot, path of a file, name of a shipped robot, or ``example:NAME``.
-    observe
-        Leg labels or link names; default: what the file observes, else all legs.
-    camera
-        Link that carries the camera (default: the base), or named cameras ``NAME=LINK@x,y,z/r,p,y`` (m, rad).
-    sensor
-        Other observations, ``[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius`` (m, link frame).
+    robot, observe, camera, sensor
+        Robot and observations, as for ``derive``.
     real
         True for the real robot with its motors instead of the hidden robot.
     points

@@ -38,7 +38,8 @@ SMALL = (104.0, 78.0)
 
 def write_pages(folder: str, parts: Iterable[str]) -> Made:
     """Write the pages of packed structures, each after its robot files and whole; gives for each its word, and how its
-    derivation differs from the record (empty: it does not). Raises ``Stopped`` where the disk takes no more."""
+    derivation differs from the record (empty: it does not). Raises ``WorkInterruption`` where the disk takes no
+    more."""
     found: Made = []
     for part in parts:
         structure = Structure.unpack(part)

@@ -249,8 +249,8 @@ class LoopAssembly:
         return start
 
     def _damped_step(self, at: Residual, factor: float) -> Array:
-        """Return the damped step, no longer than ``LOOP_STRIDE``; near the solution the plain one without weak
-        directions."""
+        """Return the damped step, no longer than ``LOOP_ASSEMBLY_STEP_MAX``; near the solution the plain one without
+        weak directions."""
         U, s, Vt = decompose_matrix(at.J)
         if at.size < self.noise and factor <= 1.0:
             kept = s > WEAK_CONSTRAINT_FRACTION * s[0]

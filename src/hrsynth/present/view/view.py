@@ -11,7 +11,7 @@ import numpy as np
 
 from ...analysis.analysis_declaration import analysis
 from ...analysis.derive import Derivation, derive
-from ...analysis.observed import POINTS, CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike
+from ...analysis.observed import POINTS, CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SensorLike
 from ...geometry.vectors import Array, orient_axis
 from ...kinematics.coordinates import Coordinates
 from ...kinematics.platform_motion import PlatformMotion
@@ -171,7 +171,7 @@ def view(
     observe: LegsLike = None,
     camera: CameraLike = None,
     *,
-    sensor: SeeLike = None,
+    sensor: SensorLike = None,
     hidden: Annotated[bool, option("Show the hidden robot too, its virtual actuators highlighted.")] = False,
     seed: Seed = 0,
 ) -> View:

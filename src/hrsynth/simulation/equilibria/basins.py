@@ -16,7 +16,7 @@ import numpy as np
 from ...analysis.accuracy.error_map import Mapper
 from ...analysis.accuracy.measurement_bounds import MeasurementBounds
 from ...analysis.analysis_declaration import analysis
-from ...analysis.observed import CameraLike, Jobs, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike
+from ...analysis.observed import CameraLike, Jobs, LegsLike, ObservedRobot, RobotLike, Seed, SensorLike
 from ...analysis.pose_requests import solve_configurations
 from ...batch.grids import list_grid_poses
 from ...batch.pose_continuation import sweep
@@ -209,7 +209,7 @@ def basins(
     observe: LegsLike = None,
     camera: CameraLike = None,
     *,
-    sensor: SeeLike = None,
+    sensor: SensorLike = None,
     goal: Annotated[PoseLike, option("Pose whose measured values are desired.", "POSE")],
     plane: Annotated[
         PoseLike | None,

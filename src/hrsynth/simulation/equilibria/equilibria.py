@@ -21,7 +21,7 @@ from ...analysis.branch.carried_vectors import SweptChains
 from ...analysis.configuration_report import ConfigurationAnalysis
 from ...analysis.measured import MeasuredRobot
 from ...analysis.modes.modes import AssemblyModes, modes
-from ...analysis.observed import CameraLike, Jobs, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike
+from ...analysis.observed import CameraLike, Jobs, LegsLike, ObservedRobot, RobotLike, Seed, SensorLike
 from ...analysis.pose_requests import solve_configurations
 from ...budgets import SUBDIVISION_BOXES_MAX
 from ...constraints.condition import Condition
@@ -74,7 +74,7 @@ def equilibria(
     observe: LegsLike = None,
     camera: CameraLike = None,
     *,
-    sensor: SeeLike = None,
+    sensor: SensorLike = None,
     goal: Annotated[
         PoseLike | None,
         option(

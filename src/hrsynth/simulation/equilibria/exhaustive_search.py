@@ -56,7 +56,7 @@ class SubdivisionResult(Value):
     """Searched box: lower and upper corner, in coordinates about the goal; None: all poses."""
     error: PoseError | None = None
     short: tuple[ClosedFormLeg, ...] = ()
-    """Freely rotating sliding rods; poses at which one is shorter than ``SHORTEST_ROD`` were not searched."""
+    """Freely rotating sliding rods; poses at which one is shorter than ``SLIDING_ROD_LENGTH_MIN`` were not searched."""
     struts: Struts | None = None
     """Legs of a platform that translates, whose joints' own singularities and all whose rotations were searched."""
     locked: tuple[tuple[Array, Array], ...] = ()

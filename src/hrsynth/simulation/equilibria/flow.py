@@ -197,7 +197,7 @@ class Flow(Value):
 
 def damped_inverse(A: Array, g: Array) -> tuple[Array, Array]:
     """Return −V max(Σ², DAMPED²)⁻¹ Vᵀ g (n, d) for A = V Σ² Vᵀ (n, d, d), as ``law.damped_inverses``; and the smallest
-    of Σ (n,), or a lower bound of it from ``FLOW_WEAK`` times ``DAMPED`` on."""
+    of Σ (n,), or a lower bound of it from ``FLOW_DAMPING_FRACTION`` times ``DAMPED`` on."""
     d = A.shape[1]
     with np.errstate(all="ignore"):
         found = solve_definite(A, np.concatenate([g[..., None], np.broadcast_to(np.eye(d), A.shape)], axis=2))
