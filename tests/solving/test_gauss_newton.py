@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from hrsynth.geometry.gauss_newton import DampingFactor, Residual, descend
 from hrsynth.geometry.vectors import Array
+from hrsynth.solving.gauss_newton import DampingFactor, Residual, descend
 
 DAMPING = DampingFactor(start=1.0, eased=0.1, least=1e-9, most=1e8)
 

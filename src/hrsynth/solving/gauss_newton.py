@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-from .vectors import Array
+from ..geometry.vectors import Array
 
 X = TypeVar("X")
 
@@ -21,6 +21,10 @@ class DampingFactor:
     eased: float
     least: float
     most: float
+
+
+UNDAMPED = DampingFactor(start=1.0, eased=1.0, least=1.0, most=1.0)
+"""Steps are taken as long as they help."""
 
 
 @dataclass(frozen=True, eq=False)
