@@ -6,7 +6,7 @@ are met count as a geometry's numbers, known to ``tolerances.CHAIN_ROUNDING`` ex
 exact.
 
 The arithmetic of sums of slopes and of radii is written once, in functions of numbers: of arrays here, of one box after
-the other where :mod:`..batch.box_machine` has them compiled.
+the other where :mod:`..equations.box_machine` has them compiled.
 """
 
 from __future__ import annotations
@@ -132,6 +132,13 @@ class AffineForms:
         """Return the forms with the last two dimensions transposed."""
         return AffineForms(np.swapaxes(self.v, -1, -2), np.swapaxes(self.r, -1, -2))
 
+    def reshaped(self, *sides: int) -> AffineForms:
+        """Return the forms with the last dimension laid out in several, or the last ones in one, of these sides."""
+        kept = self.r.ndim - 1 if len(sides) > 1 else self.r.ndim - 2
+        return AffineForms(
+            self.v.reshape(*self.v.shape[: kept + 1], *sides), self.r.reshape(*self.r.shape[:kept], *sides)
+        )
+
     def sum(self, axis: int = -1) -> AffineForms:
         """The sum along one of the last dimensions."""
         return _add_rounding(self.v.sum(axis=axis), self.r.sum(axis=axis), np.abs(self.v).sum(axis=0).sum(axis=axis))
@@ -197,6 +204,24 @@ def combine(Y: Array, forms: AffineForms) -> AffineForms:
     size = np.abs(Y) @ np.abs(v).sum(axis=0)
     found = _add_rounding(Y @ v, np.abs(Y) @ r, size * Y.shape[-1])
     return AffineForms(found.v[..., 0], found.r[..., 0]) if flat else found
+
+
+def compute_matrix_product(A: AffineForms, B: AffineForms) -> AffineForms:
+    """A B for matrices of forms (…, k, m) and (…, m, n), of few symbols and columns (64 roundings are enough)."""
+    a, b = A.v, B.v
+    v, size_a, size_b = a @ b[0] + a[0] @ b, np.abs(a), np.abs(b)
+    v[0] = a[0] @ b[0] + 0.5 * (a[1:] @ b[1:]).sum(axis=0)
+    shared = (size_a[1:] @ size_b[1:]).sum(axis=0)
+    slopes_a, slopes_b = size_a[1:].sum(axis=0), size_b[1:].sum(axis=0)
+    whole_a, whole_b = size_a[0] + slopes_a, size_b[0] + slopes_b
+    r = whole_a @ B.r + A.r @ (whole_b + B.r) + slopes_a @ slopes_b - 0.5 * shared
+    return _add_rounding(v, r, 2 * whole_a @ whole_b)
+
+
+def compute_right_product(forms: AffineForms, Z: Array) -> AffineForms:
+    """F Z for forms F (…, k, m) and exact floats Z (…, m, n)."""
+    size = np.abs(forms.v).sum(axis=0) @ np.abs(Z)
+    return _add_rounding(forms.v @ Z, forms.r @ np.abs(Z), size * Z.shape[-2])
 
 
 def _add_rounding(v: Array, r: Array, size: Array) -> AffineForms:

@@ -12,9 +12,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..budgets import INCIDENCE_SAMPLES_COUNT
 from ..tolerances import POINT_DISTANCE_TOL, RANK_GAP_MIN
 from .vectors import Array, cross, dot
+
+INCIDENCE_SAMPLES_COUNT = 2
+"""Samples besides the first at which an incidence must hold to count as structural."""
 
 Indices = NDArray[np.intp]
 

@@ -77,21 +77,21 @@ def turn_about(normal: Array, R: Array) -> tuple[float, Array]:
 
 
 def decompose_rotation(axes: Array, R: Array) -> Array:
-    """The angles (k,) about up to three axes (k, 3), at right angles to each other, of which a rotation is made: R =
-    exp θ₁[a₁]ₓ exp θ₂[a₂]ₓ …; the second one within a quarter turn where there are three."""
+    """The angles (…, k) about up to three axes (k, 3), at right angles to each other, of which rotations (…, 3, 3) are
+    made: R = exp θ₁[a₁]ₓ exp θ₂[a₂]ₓ …; the second one within a quarter turn where there are three."""
     a, b, c = _extend_to_frame(axes)
     E = np.array([a, b, c])
     R = E @ R @ E.T
     if len(axes) < 3:
         # R a₂ is turned by the first alone, Rᵀ a₁ by the second alone
-        return np.array([math.atan2(R[2, 1], R[1, 1]), math.atan2(R[0, 2], R[0, 0])])[: len(axes)]
-    return np.array(
-        [
-            math.atan2(-R[1, 2], R[2, 2]),
-            math.atan2(R[0, 2], math.hypot(R[1, 2], R[2, 2])),
-            math.atan2(-R[0, 1], R[0, 0]),
-        ]
-    ) * [1.0, 1.0, np.sign(np.linalg.det(E))]
+        both = np.arctan2(R[..., 2, 1], R[..., 1, 1]), np.arctan2(R[..., 0, 2], R[..., 0, 0])
+        return np.stack(both[: len(axes)], -1)
+    angles = [
+        np.arctan2(-R[..., 1, 2], R[..., 2, 2]),
+        np.arctan2(R[..., 0, 2], np.hypot(R[..., 1, 2], R[..., 2, 2])),
+        np.arctan2(-R[..., 0, 1], R[..., 0, 0]),
+    ]
+    return np.stack(angles, -1) * [1.0, 1.0, np.sign(np.linalg.det(E))]
 
 
 def _extend_to_frame(axes: Array) -> tuple[Array, Array, Array]:
