@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..budgets import BOX_STEPS_IN_NUMPY, BOXES_A_CALL
 from ..geometry import affine
 from ..geometry.affine import (
     EXACT_SINE_ANGLE_MAX_RAD,
@@ -35,8 +34,11 @@ from ..geometry.affine import (
 )
 from ..geometry.vectors import Array
 from ..results import Value
-from .program import load_compiled_module
+from .compiled_module import load_compiled_module
 from .tape import TAPE_LANES_COUNT
+
+BOX_STEPS_IN_NUMPY, BOXES_A_CALL = 40_000_000, 600
+"""Operations on boxes done in NumPy before numba is started, and boxes that take as long as one call."""
 
 Places = NDArray[np.int64]
 Term = tuple[float, float]

@@ -16,15 +16,19 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import BadMechanism
-from ...geometry import lines
-from ...geometry.affine import AffineForms, compute_cross_forms, compute_dot_forms
-from ...geometry.so3 import decompose_rotation
-from ...geometry.vectors import Array, build_plane_axes, cross, freeze_array, hat, invert_pose, transform
-from ...mechanism import Joint, JointType, Mechanism, graphs
-from ...mechanism.screws import split_elementary
-from ...results import Value
-from ...tolerances import AXIS_COMPONENT_ROUNDING_TOL, POINT_DISTANCE_TOL
+from ..errors import BadMechanism
+from ..geometry import lines
+from ..geometry.affine import AffineForms, compute_cross_forms, compute_dot_forms
+from ..geometry.so3 import decompose_rotation
+from ..geometry.vectors import Array, build_plane_axes, cross, freeze_array, hat, invert_pose, times
+from ..mechanism import Joint, JointType, Mechanism, graphs
+from ..mechanism.normal import reduce_to_normal_form
+from ..mechanism.screws import split_elementary
+from ..results import Value
+from ..tolerances import CHAIN_ROUNDING, POINT_DISTANCE_TOL
+
+AXIS_COMPONENT_ROUNDING_TOL = 1e-15
+"""Component of a unit vector below which it is zero."""
 
 _PREFERRED = {"F": 0, "6": 1, "P": 2, "R": 3, "C": 4, "U": 5, "E": 6, "S": 7}
 """Priority of joint types in the spanning tree."""
@@ -34,7 +38,7 @@ _PREFERRED = {"F": 0, "6": 1, "P": 2, "R": 3, "C": 4, "U": 5, "E": 6, "S": 7}
 class TreeCoordinate(Value):
     """Coordinate of a joint: a rotation (rad) about, or a translation (characteristic lengths) along an ``axis`` (3,)
     through ``point`` (3,), both as they lie at zero; ``parent`` is the coordinate before it, −1 at the base; ``zero``
-    is its value there."""
+    is its value there; ``acts`` is the joint of the normal form that it is part of."""
 
     name: str
     joint: str
@@ -43,6 +47,7 @@ class TreeCoordinate(Value):
     point: Array
     parent: int
     driven: bool = False
+    acts: str = ""
     zero: float = 0.0
 
     def from_zero(self, value: Any) -> Any:
@@ -82,6 +87,8 @@ class JointLoop(Value):
     swings: int = 0
     planar: bool = False
     """True if all its links move in a plane, so that at most three equations are independent."""
+    tips: tuple[int, ...] = ()
+    """The coordinates of a ball that is cut in one of its R: they follow from the loop that closes it in a point."""
 
     @property
     def coordinates(self) -> tuple[int, ...]:
@@ -98,6 +105,16 @@ class CouplingEquation(Value):
     first: int
     second: int
     ratio: float
+
+    @property
+    def coordinates(self) -> tuple[int, int]:
+        """Both coordinates."""
+        return self.first, self.second
+
+    @property
+    def slope(self) -> dict[int, float]:
+        """Its derivatives by the coordinates; the equation is linear."""
+        return {self.second: 1.0, self.first: -self.ratio}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -147,9 +164,14 @@ class LoopSystem(Value):
     @property
     def metric(self) -> LoopSystem:
         """Return the system in metres; values that are zero up to rounding are zero."""
+        return self.in_units(1.0)
+
+    def in_units(self, length: float) -> LoopSystem:
+        """Return the system with another unit of lengths (m); values that are zero up to rounding are zero."""
+        scale = self.length / length
 
         def point(p: Array) -> Array:
-            return freeze_array(_drop_rounding(p * self.length))
+            return freeze_array(_drop_rounding(p * scale))
 
         def row(each: LoopRow) -> LoopRow:
             return replace(
@@ -158,16 +180,16 @@ class LoopSystem(Value):
                 other=None if each.other is None else _drop_rounding(each.other),
             )
 
-        units = self.units
+        units = np.array([scale if coordinate.slides else 1.0 for coordinate in self.coordinates])
         return replace(
             self,
-            length=1.0,
+            length=length,
             coordinates=tuple(
                 replace(
                     each,
                     axis=freeze_array(_drop_rounding(each.axis)),
                     point=point(each.point),
-                    zero=each.zero * (self.length if each.slides else 1.0),
+                    zero=each.zero * (scale if each.slides else 1.0),
                 )
                 for each in self.coordinates
             ),
@@ -190,19 +212,21 @@ class LoopSystem(Value):
         return Swept.of([self.coordinates[i] for i in chain], [values[i] for i in chain])
 
     def read(self, pose: Callable[[str], Array]) -> Array:
-        """The coordinates (N,) at which the links have their poses X_BL (4, 4), m; turns within half a one."""
-        found = np.zeros(len(self.coordinates))
+        """The coordinates (…, N) at which the links have their poses X_BL (…, 4, 4), m; turns within half a one."""
         D = {i: pose(link) @ invert_pose(self.mechanism.links[link].pose) for link, i in self.body.items()}
+        found = np.zeros((*np.shape(D[-1])[:-2], len(self.coordinates)))
         for end in (i for i in D if i >= 0):
             own = [i for i in self.way(end) if self.coordinates[i].joint == self.coordinates[end].joint]
-            moved = invert_pose(D[self.coordinates[own[0]].parent]) @ D[end]
-            centre = self.coordinates[end].point * self.length
+            before, after = D[self.coordinates[own[0]].parent], D[end]
+            centre, back = self.coordinates[end].point * self.length, np.swapaxes(before[..., :3, :3], -1, -2)
+            shift = times(back, after[..., :3, :3] @ centre + after[..., :3, 3] - before[..., :3, 3]) - centre
             for i in own:
                 if self.coordinates[i].slides:
-                    found[i] = self.coordinates[i].axis @ (transform(moved, centre) - centre) / self.length
+                    found[..., i] = shift @ self.coordinates[i].axis / self.length
             turns = [i for i in own if not self.coordinates[i].slides]
             if turns:
-                found[turns] = decompose_rotation(np.array([self.coordinates[i].axis for i in turns]), moved[:3, :3])
+                axes = np.array([self.coordinates[i].axis for i in turns])
+                found[..., turns] = decompose_rotation(axes, back @ after[..., :3, :3])
         return found + self.zero
 
     def pose(self, link: str, values: Sequence[float] | Array) -> Array:
@@ -374,17 +398,19 @@ def build_loop_system(mechanism: Mechanism, driven: Sequence[str], free: bool = 
     length = mechanism.length
     joints = list(mechanism.joints.values())
     normal = find_motion_plane(joints)
+    acts = _list_merged_joints(mechanism) if driven else dict(mechanism.joints)
     if free:
         joints = [_make_free_joint(mechanism, normal), *joints]
-    geared = {link for c in mechanism.couplings for link in (c.predecessor, c.successor)}
     weights = [
-        -2.0 if free and not k else _weigh_joint(joint, mechanism, driven, geared) for k, joint in enumerate(joints)
+        -2.0 if free and not k else _weigh_joint(joint, acts[joint.name], mechanism, driven)
+        for k, joint in enumerate(joints)
     ]
     tree = graphs.build_spanning_forest(mechanism.links, joints, weights)
     coordinates: list[TreeCoordinate] = []
     body = {mechanism.base: -1}
     for joint, near, far in graphs.order_outward(mechanism.base, tree):
         own = joint if joint.predecessor == near else joint.turned()
+        one = acts.get(joint.name, joint)
         parent = body[near]
         cut = list_joint_parts(own)
         if own is not joint and joint.type is JointType.UNIVERSAL:
@@ -396,26 +422,45 @@ def build_loop_system(mechanism: Mechanism, driven: Sequence[str], free: bool = 
                     joint.name,
                     slides,
                     freeze_array(axis),
-                    freeze_array(own.point / length),
+                    freeze_array(one.point / length),
                     parent,
                     joint.name in driven,
+                    one.name,
                 )
             )
             parent = len(coordinates) - 1
         body[far] = parent
     kept = {joint.name for joint in tree}
-    missing = [name for name in driven if name not in kept]
+    missing = [name for name in (*driven, *sorted(mechanism.coupled_joints)) if name not in kept]
     if missing:
-        raise BadMechanism(f"{mechanism.name}: motors form a kinematic loop by themselves", ", ".join(missing))
+        what = "motors" if set(missing) & set(driven) else "couplings"
+        raise BadMechanism(f"{mechanism.name}: {what} form a kinematic loop by themselves", ", ".join(missing))
     system = LoopSystem(
         mechanism, length, tuple(coordinates), body, (), _list_couplings(mechanism, coordinates, length)
     )
     loops = [
-        _build_loop(system, joint, normal)
+        _build_loop(system, joint, acts[joint.name].point, normal)
         for joint in joints
         if joint.name not in kept and joint.type is not JointType.FREE
     ]
-    return replace(system, loops=tuple(_shorten_loop(system, loops, loop) for loop in loops))
+    return replace(system, loops=tuple(part for loop in loops for part in _shorten_loop(system, acts, loops, loop)))
+
+
+def _list_merged_joints(mechanism: Mechanism) -> dict[str, Joint]:
+    """Return for each joint the U or ball that it makes with others, R whose axes meet but for rounding, or itself."""
+    near = CHAIN_ROUNDING * mechanism.length
+    normal = reduce_to_normal_form(mechanism)
+    found = dict(mechanism.joints)
+    for name, parts in normal.made_of.items():
+        joint = normal.mechanism.joints.get(name)
+        if joint is None or joint.type not in (JointType.UNIVERSAL, JointType.SPHERICAL):
+            continue
+        every = (found[part] for part in parts)
+        if all(
+            lines.measure_line_distance(joint.point, each.point, each.axes[0]) <= near for each in every if each.axes
+        ):
+            found |= dict.fromkeys(parts, joint)
+    return found
 
 
 def find_motion_plane(joints: Sequence[Joint]) -> Array | None:
@@ -444,12 +489,12 @@ def _make_free_joint(mechanism: Mechanism, normal: Array | None) -> Joint:
     return Joint(name, kind, mechanism.base, mechanism.platform, centre, () if normal is None else (normal,))
 
 
-def _weigh_joint(joint: Joint, mechanism: Mechanism, driven: Sequence[str], geared: set[str]) -> float:
-    """Sort key of the spanning tree: motors and couplings first, then joints with few dof; joints of the platform
-    last."""
-    if joint.name in driven or (joint.successor in geared and joint.type.freedoms == 1):
+def _weigh_joint(joint: Joint, acts: Joint, mechanism: Mechanism, driven: Sequence[str]) -> float:
+    """Sort key of the spanning tree: motors and couplings first, then joints with few dof, as they act; joints of the
+    platform last."""
+    if joint.name in driven or joint.name in mechanism.coupled_joints:
         return -1.0
-    return _PREFERRED[joint.type.value] + (0.5 if mechanism.platform in joint.links else 0.0)
+    return _PREFERRED[acts.type.value] + (0.5 if mechanism.platform in joint.links else 0.0)
 
 
 def list_joint_parts(joint: Joint) -> list[tuple[str, bool, Array]]:
@@ -466,62 +511,67 @@ def _list_couplings(
 ) -> tuple[CouplingEquation, ...]:
     found = []
     for coupling in mechanism.couplings:
-        pair = []
-        for link in (coupling.predecessor, coupling.successor):
-            carriers = [
-                j.name for j in mechanism.joints.values() if j.successor == link and j.in_tree and j.type.freedoms == 1
-            ]
-            places = [i for i, each in enumerate(coordinates) if carriers and each.joint == carriers[0]]
-            if not places:
-                raise BadMechanism(f"coupling {coupling.name!r}: no single joint carries the link", link)
-            pair.append(places[0])
-        first, second = pair
+        names = coupling.driver, coupling.driven
+        first, second = pair = [next(i for i, each in enumerate(coordinates) if each.joint == name) for name in names]
         scale = [length if coordinates[i].slides else 1.0 for i in pair]
         found.append(CouplingEquation(coupling.name, first, second, coupling.ratio * scale[0] / scale[1]))
     return tuple(found)
 
 
-def _build_loop(system: LoopSystem, joint: Joint, normal: Array | None) -> JointLoop:
-    """The loop that a cut joint closes, its equations as its type has them."""
+def _build_loop(system: LoopSystem, joint: Joint, centre: Array, normal: Array | None) -> JointLoop:
+    """The loop that a joint closes which is cut at its centre, its equations as its type has them."""
     a, b = (system.way(system.body[link]) for link in joint.links)
     shared = sum(1 for i, k in zip(a, b, strict=False) if i == k)
-    point = joint.point / system.length
     return JointLoop(
         joint.name,
         joint.links,
         (a[shared:], b[shared:]),
-        freeze_array(point),
+        freeze_array(centre / system.length),
         tuple(list_joint_equations(joint)),
         planar=normal is not None,
     )
 
 
-def _shorten_loop(system: LoopSystem, loops: Sequence[JointLoop], loop: JointLoop) -> JointLoop:
+def _shorten_loop(
+    system: LoopSystem, acts: Mapping[str, Joint], loops: Sequence[JointLoop], loop: JointLoop
+) -> tuple[JointLoop, ...]:
     """The loop without a joint that only it has, where it is closed in a point: that the distance of the ball that is
-    cut from this joint's centre is right is all that the others have to do with it (a rod)."""
-    joints = system.mechanism.joints
-    if joints[loop.name].type is not (JointType.REVOLUTE if loop.planar else JointType.SPHERICAL):
-        return loop
+    cut from this joint's centre is right is all that the others have to do with it (a rod). Of a ball that is cut in
+    one of its R the equations of directions are a loop of their own, in which the others of its R follow."""
+    if acts[loop.name].type is not (JointType.REVOLUTE if loop.planar else JointType.SPHERICAL):
+        return (loop,)
     turning = (JointType.REVOLUTE,) if loop.planar else (JointType.UNIVERSAL, JointType.SPHERICAL)
     others = {i for each in loops if each is not loop for i in each.coordinates}
-    others |= {i for gear in system.gears for i in (gear.first, gear.second)}
+    others |= {i for gear in system.gears for i in gear.coordinates}
+    cut = acts[loop.name].name
+    tips = tuple(i for i in loop.coordinates if system.coordinates[i].acts == cut)
+    if any(i in others or system.coordinates[i].driven for i in tips):
+        return (loop,)
+    points, aligned = (
+        tuple(row for row in loop.rows if (row.kind == "point") is is_point) for is_point in (True, False)
+    )
+    rod = loop
+    if tips:
+        near, far = (tuple(i for i in each if i not in tips) for each in loop.chains)
+        rod = replace(loop, rows=points, chains=(near, far))
     for side in (0, 1):
-        chain = loop.chains[side]
+        chain = rod.chains[side]
         for place, i in enumerate(chain):
             own = system.coordinates[i]
-            if own.joint not in joints or joints[own.joint].type not in turning or own.driven or i in others:
+            if own.joint not in acts or acts[own.joint].type not in turning or own.driven or i in others:
                 continue
-            swings = sum(system.coordinates[k].joint == own.joint for k in chain)
+            swings = sum(each.acts == own.acts for each in system.coordinates)
             reach = loop.point - own.point
-            rod = np.linalg.norm(cross(own.axis, reach) if loop.planar else reach)
+            length = np.linalg.norm(cross(own.axis, reach) if loop.planar else reach)
             if (
-                rod < POINT_DISTANCE_TOL
-                or sum(system.coordinates[k].joint == own.joint for k in chain[place:]) < swings
+                length < POINT_DISTANCE_TOL
+                or sum(system.coordinates[k].acts == own.acts for k in chain[place : place + swings]) < swings
             ):
                 continue
-            ends, chains = (loop.ends, loop.chains) if side else (loop.ends[::-1], loop.chains[::-1])
-            return replace(loop, ends=ends, chains=chains, swung=place, swings=swings)
-    return loop
+            ends, chains = (rod.ends, rod.chains) if side else (rod.ends[::-1], rod.chains[::-1])
+            rod = replace(rod, ends=ends, chains=chains, swung=place, swings=swings)
+            return (rod, replace(loop, rows=aligned, tips=tips)) if tips else (rod,)
+    return (loop,)
 
 
 def list_joint_equations(joint: Joint) -> list[LoopRow]:

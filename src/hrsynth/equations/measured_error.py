@@ -15,28 +15,20 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ...analysis.branch.carried_vectors import (
-    Product,
-    SweptChains,
-    Total,
-    add_bend,
-    add_slope,
-    build_row_product,
-    compute_outer_product,
-)
-from ...analysis.branch.loops import CouplingEquation, JointLoop, LoopRow, LoopSystem, build_loop_system
-from ...geometry.affine import compute_cross_forms, stack
-from ...geometry.jets import Jet, compute_jet_angle
-from ...geometry.so3 import convert_vectors_to_rotations
-from ...geometry.vectors import Array, cross, transform
-from ...kinematics.configuration import ClosedConfiguration, measure
-from ...kinematics.velocity_relation import ObservationModel
-from ...mechanism.cameras import CameraObservation
-from ...mechanism.observation import Observation
-from ...mechanism.observations.direction import SeenAxis
-from ...mechanism.observations.encoder import AngleEncoder, SlideEncoder
-from ...results import Value
-from ...tolerances import RANK_CUTOFF_FRACTION
+from ..geometry.affine import compute_cross_forms, stack
+from ..geometry.jets import Jet, compute_jet_angle
+from ..geometry.so3 import convert_vectors_to_rotations
+from ..geometry.vectors import Array, cross, transform
+from ..kinematics.configuration import ClosedConfiguration, measure
+from ..kinematics.velocity_relation import ObservationModel
+from ..mechanism.cameras import CameraObservation
+from ..mechanism.observation import Observation
+from ..mechanism.observations.direction import SeenAxis
+from ..mechanism.observations.encoder import AngleEncoder, SlideEncoder
+from ..results import Value
+from ..tolerances import RANK_CUTOFF_FRACTION
+from .carried_vectors import Product, SweptChains, Total, add_bend, add_slope, build_row_product, compute_outer_product
+from .joint_equations import CouplingEquation, JointLoop, LoopRow, LoopSystem, build_loop_system
 
 Row = tuple[JointLoop, LoopRow]
 
@@ -329,8 +321,8 @@ class CriticalPointEquations:
             add_slope(own, product)
             rates.add((k, slice(None)), own.sum)
         for k, gear in enumerate(system.gears, len(system.rows)):
-            closing.add((k,), values[gear.second] - values[gear.first] * gear.ratio)
-            for i, rate in ((gear.second, 1.0), (gear.first, -gear.ratio)):
+            for i, rate in gear.slope.items():
+                closing.add((k,), values[i] * rate)
                 rates.add((k, i), rate)
         self.G, self.DG = closing.sum, rates.sum
         sums = self._error()

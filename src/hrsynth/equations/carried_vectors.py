@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...geometry.affine import AffineForms, compute_cross_forms, compute_dot_forms, stack
-from ...geometry.vectors import Array
-from .loops import JointLoop, LoopRow, LoopSystem, Swept, rotate
+from ..geometry.affine import AffineForms, compute_cross_forms, compute_dot_forms, compute_matrix_product, stack
+from ..geometry.vectors import Array
+from .joint_equations import JointLoop, LoopRow, LoopSystem, Swept, rotate
 
 Places = NDArray[np.intp]
 
@@ -62,8 +62,9 @@ class Product:
 class SweptChains:
     """The vectors that a system's coordinates carry at some values (N,) of (…) each; what has been swept is kept."""
 
-    def __init__(self, system: LoopSystem, values: Sequence[Any]) -> None:
-        self.system, self.values = system, values
+    def __init__(self, system: LoopSystem, values: Sequence[Any], order: Places | None = None) -> None:
+        """Keep the values; with an ``order`` (N,) derivatives are by those that are not None, at its places."""
+        self.system, self.values, self.order = system, values, order
         self._swept: dict[tuple[int, ...], tuple[Swept, Any, Any, Any]] = {}
         self._known: dict[tuple[Any, ...], CarriedVector] = {}
 
@@ -81,6 +82,10 @@ class SweptChains:
             self._swept[chain] = swept, axes, points, along
         return self._swept[chain]
 
+    def rotation(self, chain: tuple[int, ...]) -> Any:
+        """The rotation (…, 3, 3) behind a chain."""
+        return self._chain(chain)[0].R
+
     def point(self, chain: tuple[int, ...], p: Array) -> CarriedVector:
         """The place of a point (3,), as it lies at zero, behind a chain."""
         key = (chain, *p.tolist())
@@ -89,9 +94,7 @@ class SweptChains:
             at = swept.at(p)
             self._known[key] = CarriedVector(
                 at,
-                _split_chain_columns(
-                    chain, lambda: compute_cross_forms(axes, at[..., None, :] - points) + slides, axes
-                ),
+                self._split_columns(chain, lambda: compute_cross_forms(axes, at[..., None, :] - points) + slides, axes),
             )
         return self._known[key]
 
@@ -99,11 +102,16 @@ class SweptChains:
         """A direction (3,), as it is at zero, behind a chain."""
         swept, axes, *_ = self._chain(chain)
         v = rotate(swept.R, d)
-        return CarriedVector(v, _split_chain_columns(chain, lambda: compute_cross_forms(axes, v[..., None, :]), axes))
+        return CarriedVector(v, self._split_columns(chain, lambda: compute_cross_forms(axes, v[..., None, :]), axes))
 
-
-def _split_chain_columns(chain: tuple[int, ...], columns: Callable[[], Any], axes: Any) -> tuple[ChainColumns, ...]:
-    return (ChainColumns(np.array(chain, dtype=np.intp), columns(), axes),) if chain else ()
+    def _split_columns(self, chain: tuple[int, ...], columns: Callable[[], Any], axes: Any) -> tuple[ChainColumns, ...]:
+        places = np.array(chain, dtype=np.intp)
+        if self.order is None:
+            return (ChainColumns(places, columns(), axes),) if chain else ()
+        moving = [k for k, i in enumerate(chain) if self.values[i] is not None]
+        if not moving:
+            return ()
+        return (ChainColumns(self.order[places[moving]], columns()[..., moving, :], axes[..., moving, :]),)
 
 
 def build_row_product(carrier: SweptChains, loop: JointLoop, row: LoopRow) -> Product:
@@ -119,6 +127,20 @@ def build_row_product(carrier: SweptChains, loop: JointLoop, row: LoopRow) -> Pr
     assert row.one is not None
     k = carrier.direction(loop.chains[0], row.one) if row.carried else CarriedVector(row.one)
     return Product(k, carrier.point(loop.chains[1], loop.point) - carrier.point(loop.chains[0], loop.point))
+
+
+def add_row_bend(total: Total, carrier: SweptChains, loop: JointLoop, row: LoopRow) -> None:
+    """Add the second derivatives of an equation of a loop to a sum (c, N, N)."""
+    if row.kind != "distance":
+        add_bend(total, build_row_product(carrier, loop, row))
+        return
+    assert loop.swung is not None
+    centre = carrier.system.coordinates[loop.chains[1][loop.swung]].point
+    before, after = loop.chains[1][: loop.swung], loop.chains[1][loop.swung + loop.swings :]
+    reach = carrier.point(loop.chains[0], loop.point) - carrier.point(before, centre)
+    rod = carrier.point(after, loop.point) - CarriedVector(centre)
+    add_bend(total, Product(reach, reach), 0.5)
+    add_bend(total, Product(rod, rod), -0.5)
 
 
 class Total:
@@ -155,7 +177,9 @@ def add_slope(total: Total, product: Product, weight: Any = 1.0) -> None:
 
 def add_bend(total: Total, product: Product, weight: Any = 1.0) -> None:
     """Add weight ∇²(x · y) to a sum (c, N, N)."""
-    for vector, other in ((product.x, product.y), (product.y, product.x)):
+    square = product.x is product.y
+    weight = weight * 2.0 if square else weight
+    for vector, other in ((product.x, product.y),) if square else ((product.x, product.y), (product.y, product.x)):
         for part in vector.parts:
             f = other.value * (part.sign * _convert_to_column(weight))
             pushed = compute_cross_forms(f[..., None, :], part.axes)
@@ -167,7 +191,8 @@ def add_bend(total: Total, product: Product, weight: Any = 1.0) -> None:
             columns = two.columns * _convert_to_column(_convert_to_column(weight)) * both
             across = compute_outer_product(one.columns, columns)
             total.add(np.ix_(one.places, two.places), across)
-            total.add(np.ix_(two.places, one.places), _swap_last_axes(across))
+            if not square:
+                total.add(np.ix_(two.places, one.places), _swap_last_axes(across))
 
 
 @cache
@@ -179,6 +204,8 @@ def _make_triangle_masks(size: int) -> tuple[Array, Array]:
 
 def compute_outer_product(a: Any, b: Any) -> Any:
     """The products a_i · b_j (…, k, l) of vectors (…, k, 3) and (…, l, 3)."""
+    if isinstance(a, AffineForms) and isinstance(b, AffineForms):
+        return compute_matrix_product(a, b.transposed())
     if isinstance(a, AffineForms) or isinstance(b, AffineForms):
         return (a[..., :, None, :] * b[..., None, :, :]).sum(-1)
     return a @ np.swapaxes(b, -1, -2)

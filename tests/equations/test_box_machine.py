@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hrsynth.batch import box_machine
-from hrsynth.batch.enclosures import BoxFormula, trace_formula
+from hrsynth.equations import box_machine
+from hrsynth.equations.box_formula import BoxFormula, trace_formula
 from hrsynth.geometry.affine import AffineForms, enclose_sines, make_affine, stack
 from hrsynth.geometry.components import cosine, sine, sqrt
 

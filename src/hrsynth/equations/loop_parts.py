@@ -3,19 +3,20 @@ equations that are solved one after another; closing a part in floating point.""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from ...errors import BadRequest, MotorsNotEnough
-from ...geometry.ranks import compute_matrix_spectrum
-from ...geometry.vectors import Array, times
-from ...results import Value
-from ...tolerances import CLOSURE_SOLVER_TOL, NAMED_TWIST_TOL, RANK_CUTOFF_FRACTION
-from .loops import CouplingEquation, JointLoop, LoopRow, LoopSystem, evaluate_residuals
+from ..errors import BadRequest, MotorsNotEnough
+from ..geometry.ranks import compute_matrix_spectrum
+from ..geometry.vectors import Array, times
+from ..results import Value
+from ..solving.newton import ApproachedZeros, approach_zeros
+from ..tolerances import CLOSURE_SOLVER_TOL, NAMED_TWIST_TOL, RANK_CUTOFF_FRACTION
+from .joint_equations import CouplingEquation, JointLoop, LoopRow, LoopSystem, evaluate_residuals
 
 DISTANCE = LoopRow("distance")
 LOOP_PART_NEWTON_STEPS_MAX = 30
@@ -31,11 +32,9 @@ class LoopEquation(Value):
     row: LoopRow | None = None
     swings: bool = False
 
-    def names(self, system: LoopSystem) -> tuple[int, ...]:
+    def names(self) -> tuple[int, ...]:
         """The coordinates that it has to do with."""
-        if isinstance(self.of, CouplingEquation):
-            return self.of.first, self.of.second
-        if self.row is not DISTANCE:
+        if isinstance(self.of, CouplingEquation) or self.row is not DISTANCE:
             return self.of.coordinates
         assert self.of.swung is not None
         second = self.of.chains[1]
@@ -49,7 +48,20 @@ class LoopBlock:
     unknowns: tuple[int, ...]
     equations: tuple[LoopEquation, ...]
     loop: JointLoop | None = None
-    """The loop that is closed by turning one joint, of a block that does this."""
+    """The loop that is closed by turning one joint, of a block that does this: its equations depend on the cell, unless
+    it turns the tips of this loop."""
+
+    @property
+    def needed(self) -> frozenset[int]:
+        """The coordinates that its equations have to do with."""
+        needed = set(self.unknowns) | ({*self.loop.chains[0], *self.loop.chains[1]} if self.loop else set())
+        return frozenset(needed.union(*(each.names() for each in self.equations)))
+
+    @property
+    def closing(self) -> tuple[LoopEquation, ...]:
+        """Equations that close it in floats, if the blocks before it are closed."""
+        loop = self.loop
+        return self.equations if loop is None or self.equations else tuple(LoopEquation(loop, row) for row in loop.rows)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -70,6 +82,18 @@ class LoopPart(Value):
     def place(self) -> dict[int, int]:
         """Return the index of an unknown in this part."""
         return {i: k for k, i in enumerate(self.unknowns)}
+
+    @cached_property
+    def core(self) -> LoopPart:
+        """Return the part without the joints that only turn rods, and do not carry the platform: they follow."""
+        way = set(self.system.way(self.system.body[self.system.mechanism.platform]))
+        blocks = tuple(each for each in self.blocks if each.loop is None or way.intersection(each.unknowns))
+        kept = {i for block in blocks for i in block.unknowns}
+        return replace(self, unknowns=tuple(i for i in self.unknowns if i in kept), blocks=blocks)
+
+    def places_in(self, whole: LoopPart) -> list[int]:
+        """Return the indices of its unknowns in a part that it is the core of."""
+        return [whole.place[i] for i in self.unknowns]
 
     @cached_property
     def bent(self) -> tuple[int, ...]:
@@ -94,22 +118,46 @@ class LoopPart(Value):
         return errors, rates[..., list(self.unknowns)], rates[..., list(self.driven)]
 
     def close(self, q: Array, x: Array) -> tuple[Array, Array]:
-        """The unknowns (c, p) near ``x`` at which the loops are closed, by Newton's method, and which (c,) are."""
-        x = x.copy()
-        for _ in range(LOOP_PART_NEWTON_STEPS_MAX):
-            errors, A, _ = self.closure(q, x)
-            far = np.linalg.norm(errors, axis=-1) >= CLOSURE_SOLVER_TOL
-            if not far.any() or not np.all(np.isfinite(x)):
-                break
-            step = _solve_least_squares(A[far], errors[far][..., None])[..., 0]
-            x[far] -= step * np.minimum(1.0, 0.5 / np.maximum(np.abs(step).max(axis=-1, initial=0.0), 0.5))[..., None]
-        done = np.linalg.norm(self.closure(q, x)[0], axis=-1) < 100 * CLOSURE_SOLVER_TOL
+        """The unknowns (c, p) near ``x`` at which the loops are closed, by Newton's method in one block after another,
+        and which (c,) are; blocks that cannot be closed stay where they are."""
+        x, done = x.copy(), np.ones(len(x), dtype=bool)
+        for block in self.blocks:
+            ends = self._approach_closure(block, q, x)
+            closed = ends.errors < 100 * CLOSURE_SOLVER_TOL
+            done &= closed
+            x = np.where(closed[:, None], ends.x, x)
+        if self.left_out:
+            done &= np.linalg.norm(self.derive(self.left_out, q, x)[0], axis=-1) < 100 * CLOSURE_SOLVER_TOL
         return x, done & np.all(np.isfinite(x), axis=-1)
+
+    def _approach_closure(self, block: LoopBlock, q: Array, x: Array) -> ApproachedZeros:
+        """As :meth:`close`, one block."""
+
+        def solve(J: Array, F: Array) -> Array:
+            step = np.zeros((len(F), len(self.unknowns)))
+            step[:, self.list_places(block)] = _solve_least_squares(J[..., list(block.unknowns)], F[..., None])[..., 0]
+            return step
+
+        evaluate, most = lambda x, q: self.derive(block.closing, q, x), LOOP_PART_NEWTON_STEPS_MAX
+        return approach_zeros(evaluate, x, q, steps=most, longest=0.5, error_tol=CLOSURE_SOLVER_TOL, solve=solve)
+
+    def list_places(self, block: LoopBlock) -> list[int]:
+        """Return the indices of a block's unknowns in this part."""
+        return [self.place[i] for i in block.unknowns]
+
+    def derive(self, equations: Sequence[LoopEquation], q: Array, x: Array) -> tuple[Array, Array]:
+        """Some equations (…, k), and their derivatives by all coordinates (…, k, N)."""
+        return derive_equations(self.system, equations, self.values(q, x), q.shape[:-1])
 
     def slopes(self, q: Array, x: Array) -> Array:
         """dx/dq (…, p, n) at closed configurations."""
-        _, A, B = self.closure(q, x)
-        return -_solve_least_squares(A, B)
+        dx = np.zeros((*x.shape, len(self.driven)))
+        for block in self.blocks:
+            places, others = self.list_places(block), list(self.unknowns)
+            rates = self.derive(block.closing, q, x)[1]
+            drift = rates[..., list(self.driven)] + rates[..., others] @ dx
+            dx[..., places, :] = -_solve_least_squares(rates[..., list(block.unknowns)], drift)
+        return dx
 
     def follow(self, q: Array, x: Array, goal: Array, step: float = 0.1) -> tuple[Array, Array]:
         """The unknowns (c, p) at ``goal`` (c, n), reached by short steps from closed configurations, and which (c,) are
@@ -126,9 +174,46 @@ class LoopPart(Value):
         return x, good
 
 
+def evaluate_equations(
+    system: LoopSystem, equations: Sequence[LoopEquation], forms: Sequence[Any]
+) -> tuple[list[Any], list[dict[int, Any]]]:
+    """Values of equations, and their derivatives by the coordinates that are not constant, for floats or forms."""
+    values: list[Any] = [0.0] * len(equations)
+    slopes: list[dict[int, Any]] = [{} for _ in equations]
+    groups: dict[int, list[int]] = {}
+    for k, each in enumerate(equations):
+        if isinstance(each.of, CouplingEquation):
+            slopes[k] = {i: rate for i, rate in each.of.slope.items() if forms[i] is not None}
+            for i, rate in slopes[k].items():
+                values[k] = values[k] + system.coordinates[i].from_zero(forms[i]) * rate
+        else:
+            groups.setdefault(id(each.of), []).append(k)
+    for members in groups.values():
+        loop = equations[members[0]].of
+        rows = [row for row in (equations[k].row for k in members) if row is not None]
+        assert isinstance(loop, JointLoop)
+        found = evaluate_residuals(system, loop, forms, rows)
+        for k, value, slope in zip(members, *found, strict=True):
+            values[k], slopes[k] = value, slope
+    return values, slopes
+
+
 def _solve_least_squares(A: Array, B: Array) -> Array:
     """The least squares solutions (…, p, k) of A X = B, (…, m, p) and (…, m, k)."""
     return np.asarray(np.linalg.pinv(A, rcond=RANK_CUTOFF_FRACTION) @ B)
+
+
+def derive_equations(
+    system: LoopSystem, equations: Sequence[LoopEquation], values: Any, shape: tuple[int, ...] = ()
+) -> tuple[Array, Array]:
+    """Equations (…, m) and their derivatives by all coordinates (…, m, N), at values of a ``shape``, None for those at
+    zero."""
+    errors, rates = np.zeros((*shape, len(equations))), np.zeros((*shape, len(equations), len(values)))
+    for k, (value, slope) in enumerate(zip(*evaluate_equations(system, equations, values), strict=True)):
+        errors[..., k] = value
+        for i, rate in slope.items():
+            rates[..., k, i] = rate
+    return errors, rates
 
 
 def evaluate_all_equations(
@@ -138,24 +223,9 @@ def evaluate_all_equations(
     values: Any,
     shape: tuple[int, ...] = (),
 ) -> tuple[Array, Array]:
-    """Equations of loops and couplings (…, m) and their derivatives by all coordinates (…, m, N), at values of a
-    ``shape``, None for those at zero."""
-    count = sum(len(loop.rows) for loop in loops) + len(gears)
-    errors, rates = np.zeros((*shape, count)), np.zeros((*shape, count, len(values)))
-    place = 0
-    for loop in loops:
-        for value, slope in zip(*evaluate_residuals(system, loop, values, loop.rows), strict=True):
-            errors[..., place] = value
-            for i, rate in slope.items():
-                rates[..., place, i] = rate
-            place += 1
-    for gear in gears:
-        for i, rate in ((gear.second, 1.0), (gear.first, -gear.ratio)):
-            rates[..., place, i] += rate
-            if values[i] is not None:
-                errors[..., place] += system.coordinates[i].from_zero(values[i]) * rate
-        place += 1
-    return errors, rates
+    """As :func:`derive_equations`, all equations of loops, then couplings."""
+    equations = [LoopEquation(loop, row) for loop in loops for row in loop.rows] + [*map(LoopEquation, gears)]
+    return derive_equations(system, equations, values, shape)
 
 
 def split_loop_system(system: LoopSystem) -> tuple[tuple[LoopPart, ...], tuple[int, ...]]:
@@ -169,17 +239,21 @@ def split_loop_system(system: LoopSystem) -> tuple[tuple[LoopPart, ...], tuple[i
     return tuple(part for part in parts if part.driven), tuple(sorted(held))
 
 
+def _list_coordinates(loops: Iterable[JointLoop], gears: Iterable[CouplingEquation]) -> set[int]:
+    """The coordinates of loops and couplings."""
+    return {i for each in (loops, gears) for one in each for i in one.coordinates}
+
+
 def _find_internal_coordinates(system: LoopSystem) -> set[int]:
     """Choose coordinates to fix, one for each motion at zero that leaves the platform and the motors fixed: of each the
     one with the largest share. Raises ``BadRequest`` if the motors are not independent at zero."""
     held: set[int] = set()
     _, rates = evaluate_all_equations(system, system.loops, system.gears, system.zero)
-    looped = {i for loop in system.loops for i in loop.coordinates}
-    looped |= {i for gear in system.gears for i in (gear.first, gear.second)}
+    looped = _list_coordinates(system.loops, system.gears)
     # a ball on a rod spins about it
     for loop in system.loops:
         if loop.swings == 3 and loop.swung is not None:
-            own = loop.chains[1][loop.swung : loop.swung + 3]
+            own = list_turned(loop)
             rod = loop.point - system.coordinates[own[0]].point
             held.add(max(own, key=lambda i: abs(float(system.coordinates[i].axis @ rod))))
     free = [i for i, each in enumerate(system.coordinates) if not each.driven and i not in held and i in looped]
@@ -232,8 +306,7 @@ def _group_unknowns(
     home = {i: {i} for i in unknowns}
     every: list[JointLoop | CouplingEquation] = [*system.loops, *system.gears]
     for each in every:
-        own = each.coordinates if isinstance(each, JointLoop) else (each.first, each.second)
-        members = [home[i] for i in own if i in home]
+        members = [home[i] for i in each.coordinates if i in home]
         joined = set().union(*members)
         for i in joined:
             home[i] = joined
@@ -243,7 +316,7 @@ def _group_unknowns(
             continue
         seen |= home[i]
         loops = [loop for loop in system.loops if home[i].intersection(loop.coordinates)]
-        gears = [gear for gear in system.gears if home[i].intersection((gear.first, gear.second))]
+        gears = [gear for gear in system.gears if home[i].intersection(gear.coordinates)]
         found.append((sorted(home[i]), loops, gears))
     return found
 
@@ -253,52 +326,43 @@ def _build_part(system: LoopSystem, group: tuple[list[int], list[JointLoop], lis
     from scipy.linalg import qr
 
     unknowns, every, gears = group
-    loops = [_restore_loop_rows(loop, unknowns) for loop in every]
-    asked = {i for loop in loops for i in loop.coordinates} | {i for gear in gears for i in (gear.first, gear.second)}
+    loops = _restore_loop_rows(every, unknowns)
+    asked = _list_coordinates(loops, gears)
     driven = tuple(i for i in system.driven if i in asked)
-    swung: dict[int, tuple[int, ...]] = {}
+    after: list[LoopBlock] = []
     candidates: list[LoopEquation] = []
-    for place, loop in enumerate(loops):
-        if loop.swung is not None:
-            own = loop.chains[1][loop.swung : loop.swung + loop.swings]
-            swung[place] = tuple(i for i in own if i in unknowns)
-            candidates.append(LoopEquation(loop, DISTANCE))
-        else:
-            candidates += [LoopEquation(loop, row) for row in loop.rows]
+    for loop in loops:
+        rows = tuple(LoopEquation(loop, row) for row in loop.rows)
+        turned = tuple(i for i in list_turned(loop) if i in unknowns)
+        if turned:
+            after.append(LoopBlock(turned, rows if loop.tips else (), loop))
+        candidates += [LoopEquation(loop, DISTANCE)] if loop.swung is not None else [] if turned else rows
     candidates += [LoopEquation(gear) for gear in gears]
-    last = {i for own in swung.values() for i in own}
+    last = {i for block in after for i in block.unknowns}
+    way = set(system.way(system.body[system.mechanism.platform]))
+    after.sort(key=lambda block: not way.intersection(block.unknowns))
     main = [i for i in unknowns if i not in last]
-    zero = system.zero
-    rates = np.array([_derive_equation_slope(system, each, zero) for each in candidates]).reshape(
-        len(candidates), len(zero)
-    )[:, main]
+    rates = derive_equations(system, candidates, system.zero)[1][:, main]
     # independent equations at zero, the firmest first
     order = qr(rates.T, mode="r", pivoting=True)[1][: len(main)] if main else []
     chosen = [candidates[k] for k in sorted(order)]
     left_out = tuple(each for k, each in enumerate(candidates) if k not in order)
-    blocks = [*_order_blocks(system, main, chosen), *(LoopBlock(own, (), loops[place]) for place, own in swung.items())]
+    blocks = [*_order_blocks(system, main, chosen), *after]
     return LoopPart(system, driven, tuple(unknowns), tuple(blocks), tuple(loops), tuple(gears), left_out)
 
 
-def _restore_loop_rows(loop: JointLoop, unknowns: Sequence[int]) -> JointLoop:
-    """Return a loop with all its equations if the joint that was left out cannot rotate its rod everywhere: a constant
-    coordinate of it is no spin."""
-    if loop.swung is None:
-        return loop
-    turning = sum(i in unknowns for i in loop.chains[1][loop.swung : loop.swung + loop.swings])
-    return loop if turning == min(loop.swings, 2) else replace(loop, swung=None, swings=0)
+def list_turned(loop: JointLoop) -> tuple[int, ...]:
+    """Return the coordinates that a loop turns when the others are known: those of a rod's joint, or tips."""
+    return loop.tips if loop.swung is None else loop.chains[1][loop.swung : loop.swung + loop.swings]
 
 
-def _derive_equation_slope(system: LoopSystem, equation: LoopEquation, values: Array) -> Array:
-    """The derivatives (N,) of an equation."""
-    row = np.zeros(len(values))
-    if isinstance(equation.of, CouplingEquation):
-        row[equation.of.second], row[equation.of.first] = 1.0, -equation.of.ratio
-        return row
-    assert equation.row is not None
-    (slope,) = evaluate_residuals(system, equation.of, values, [equation.row])[1]
-    row[list(slope)] = list(slope.values())
-    return row
+def _restore_loop_rows(loops: Sequence[JointLoop], unknowns: Sequence[int]) -> list[JointLoop]:
+    """Return loops with all their equations if the joint that was left out cannot rotate its rod everywhere: a constant
+    coordinate of it is no spin; or if the tips of a rod do not follow."""
+    turning = {(loop.name, not loop.tips): sum(i in unknowns for i in list_turned(loop)) for loop in loops}
+    stiff = {loop.name for loop in loops if loop.swung is not None and turning[loop.name, True] != min(loop.swings, 2)}
+    stiff |= {loop.name for loop in loops if loop.tips and turning[loop.name, False] != len(loop.rows)}
+    return [replace(loop, swung=None, swings=0, tips=()) if loop.name in stiff else loop for loop in loops]
 
 
 def _order_blocks(system: LoopSystem, unknowns: Sequence[int], equations: Sequence[LoopEquation]) -> list[LoopBlock]:
@@ -312,7 +376,7 @@ def _order_blocks(system: LoopSystem, unknowns: Sequence[int], equations: Sequen
     rows = [("row", k) for k in range(len(equations))]
     pairs.add_nodes_from(rows)
     pairs.add_nodes_from(unknowns)
-    needs = [set(each.names(system)).intersection(unknowns) for each in equations]
+    needs = [set(each.names()).intersection(unknowns) for each in equations]
     pairs.add_edges_from((row, i) for row, own in zip(rows, needs, strict=True) for i in own)
     match = nx.bipartite.hopcroft_karp_matching(pairs, rows)
     if len(rows) < len(unknowns) or any(row not in match for row in rows):
