@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -108,3 +110,21 @@ def test_what_is_split_comes_together_again(name: str) -> None:
 def test_a_normal_form_is_its_own(name: str) -> None:
     once = reduce_to_normal_form(load(name)).mechanism
     assert reduce_to_normal_form(once).mechanism.differences(once) == []
+
+
+def test_couplings_mean_joints_and_go_with_them() -> None:
+    """Whatever other joint carries the same link; only what a tree can count is coupled."""
+    b = Builder("screw")
+    for name in ("base", "crank", "nut"):
+        b.link(name)
+    b.joint("turn", "R", "base", "crank", axis=Z)
+    b.joint("slide", "P", "base", "nut", axis=Z)
+    b.joint("other", "R", "crank", "nut", axis=X)
+    b.coupling("thread", "turn", "slide", 0.02)
+    screw = b.build("nut")
+    assert screw.coupled_joints == {"turn", "slide"}
+    assert screw.changed(remove_joints=["other"]).couplings == screw.couplings
+    assert screw.changed(remove_joints=["slide"]).couplings == ()
+    for changed in (replace(screw.joints["slide"], in_tree=False), replace(screw.joints["slide"], type="C")):
+        with pytest.raises(BadMechanism, match="slide"):
+            screw.changed(joints=[changed])

@@ -13,7 +13,6 @@ from itertools import combinations
 
 import numpy as np
 
-from ..budgets import CACHED_LOCKED_LEGS_COUNT
 from ..geometry.ranks import compute_range_basis
 from ..geometry.vectors import Array, cross, freeze_array, hat
 from ..kinematics.configuration import ClosedConfiguration
@@ -43,6 +42,9 @@ from .named_vectors import (
     make_axis,
     make_centre,
 )
+
+CACHED_LOCKED_LEGS_COUNT = 64
+"""Locked legs kept in the cache for other sets of legs of one robot."""
 
 TURNING_MOTIONS = ("planar", "spatial")
 """Motions of a platform of which turns are a part."""

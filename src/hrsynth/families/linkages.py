@@ -13,12 +13,16 @@ from itertools import accumulate
 
 import numpy as np
 
-from ..budgets import LINKAGE_STARTS_COUNT
 from ..errors import BadRequest
 from ..geometry.vectors import Array
 from ..mechanism.builder import Builder
 from ..mechanism.model import Mechanism
-from ..tolerances import CLOSURE_SOLVER_TOL, LEAST_SQUARES_DECREASE_TOL, RANK_CUTOFF_FRACTION
+from ..tolerances import CLOSURE_SOLVER_TOL, RANK_CUTOFF_FRACTION
+
+LEAST_SQUARES_DECREASE_TOL = 1e-5
+"""Relative decrease of a sum of squares below which least squares far from a zero stop."""
+LINKAGE_STARTS_COUNT = 200
+"""Random starts from which a linkage is closed."""
 
 RIGHT = math.pi / 2
 

@@ -27,8 +27,11 @@ from ..geometry.vectors import (
     transform,
 )
 from ..results import Value
-from ..tolerances import IMAGE_DEPTH_MIN_M, POINT_DISTANCE_TOL
+from ..tolerances import POINT_DISTANCE_TOL
 from .observation import Drawn, Observation, ObservationRecord
+
+IMAGE_DEPTH_MIN_M = 1e-3
+"""Smallest depth (m) of lines drawn in an image."""
 
 AT_CENTRE = freeze_array(np.eye(4))
 CIRCLE_POLYGON_SIDES_COUNT = 48
@@ -131,6 +134,14 @@ def make_universal(at: Array, turned: Array, far: Array | None, actuated: bool =
     return VirtualJoint("U", at, (first, normalise_vector(np.cross(first, turned))), actuated)
 
 
+def make_ray_chain(at: ViewGeometry, what: str, far: Array | None, *actuated: bool) -> tuple[VirtualJoint, ...]:
+    """Return U-P-S to the point B: U at C, with its first axis ``far`` from the ray, P along the ray;
+    ``actuated``: U is, P is. Raises ``BadMechanism`` if B is C."""
+    require_distance(at, at.B, 0.0, what, "a point outside of it")
+    slide = VirtualJoint("P", at.C, (at.ray,), actuated[1])
+    return make_universal(at.C, at.ray, far, actuated[0]), slide, VirtualJoint("S", at.B)
+
+
 def make_line_chain(at: ViewGeometry, normal: Array, out: Array, actuated: int) -> tuple[VirtualJoint, ...]:
     """Return U-R-P-C to the line (B, d): U at C rotates the ``normal`` of a plane through C, R rotates in it, P
     translates along ``out`` in it, C lies along the line; the first so many of them actuated."""
@@ -222,7 +233,7 @@ class CameraObservation(Observation):
             try:
                 object.__setattr__(self, "axis", freeze_array(normalise_vector(self.axis)))
             except ValueError:
-                raise BadMechanism(f"{self.kind} {self.leg!r}: axis", "0 0 0", "a non-zero vector") from None
+                raise BadMechanism(f"{self.text}: axis", "0 0 0", "a non-zero vector") from None
         if self.camera is not None:
             object.__setattr__(self, "seen_from", self.camera.link)
 
@@ -321,6 +332,10 @@ class CameraObservation(Observation):
             ]
         return float(np.min(np.array(sides) @ p) / max(float(np.linalg.norm(p)), POINT_DISTANCE_TOL))
 
+    def in_front(self, X_reference: Array, X_link: Array) -> float:
+        is_visible = self.camera is None or not self.images_point
+        return np.inf if is_visible else self.ahead(X_reference, X_link)
+
     def plane_at(self, X_reference: Array, X_link: Array) -> Array | None:
         """Return :meth:`plane` at these poses of camera and link, (3,)."""
         X = invert_pose(X_reference @ self.view) @ X_link
@@ -416,7 +431,7 @@ class CameraObservation(Observation):
             return [f"observation {self.leg}: {self!r} / {other!r}"]
         assert isinstance(other, CameraObservation)
         mine, theirs = ((o.camera.name if o.camera else None, o.radius) for o in (self, other))
-        found = [] if mine == theirs else [f"{self.kind} {self.leg}: camera and radius {mine} / {theirs}"]
+        found = [] if mine == theirs else [f"{self.text}: camera and radius {mine} / {theirs}"]
         pairs = (("point", self.at, other.at), ("axis", self.axis, other.axis), ("camera", self.view, other.view))
         return found + [
             f"{what} of {self.leg}: {a} / {b}"

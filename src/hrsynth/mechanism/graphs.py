@@ -7,7 +7,7 @@ in every run. ``within`` restricts a search to some of the nodes.
 from __future__ import annotations
 
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 Adjacency = Mapping[str, Collection[str]]
 
@@ -89,7 +89,7 @@ def find_shortest_path(graph: Adjacency, start: str, end: str) -> list[str]:
     return way
 
 
-def build_spanning_forest(nodes: Iterable[str], bonds: Sequence[B], weights: Sequence[float]) -> list[B]:
+def build_spanning_forest(nodes: Iterable[str], bonds: Sequence[B], weights: Sequence[Any]) -> list[B]:
     """Return the bonds of a minimum spanning forest, lightest first (Kruskal); among equals that of the earlier node,
     then of the pair that is connected first."""
     place = {node: i for i, node in enumerate(nodes)}

@@ -21,10 +21,13 @@ from numpy.typing import NDArray
 from ..geometry import lines
 from ..geometry.incidences import Incidence, Sieve, find_incidences, list_choices
 from ..geometry.vectors import Array, cross, dot, invert_pose, normalise_vector, transform, triple
-from ..tolerances import DIRECTION_SINE_TOL, DRAWING_PLANE_SINE_TOL, POINT_DISTANCE_TOL, RANK_GAP_MIN
+from ..tolerances import DIRECTION_SINE_TOL, POINT_DISTANCE_TOL, RANK_GAP_MIN
 from . import graphs
 from .model import Joint, JointType, Mechanism
 from .observations.direction import SeenAxis
+
+DRAWING_PLANE_SINE_TOL = 1e-4
+"""Sine of the angle between two planes below which they count as one when directions are put in order for drawing."""
 
 AXIAL = (JointType.REVOLUTE, JointType.CYLINDRICAL)
 """Joints whose centre may move along their axis without consequence."""

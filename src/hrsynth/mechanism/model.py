@@ -17,11 +17,14 @@ import numpy as np
 from ..errors import BadMechanism, BadRequest, NoPlatform
 from ..geometry.vectors import Array, freeze_array, invert_pose, normalise_vector
 from ..results import Result, Value, freeze_content
-from ..tolerances import CENTRE_SPREAD_MIN_FRACTION, GEOMETRY_DIFFERENCE_TOL
+from ..tolerances import GEOMETRY_DIFFERENCE_TOL
 from .cameras import NamedCamera
 from .graphs import Adjacency, build_adjacency, build_spanning_forest, find_component
 from .observation import Observation
 from .tilt_limit import TiltLimit
+
+CENTRE_SPREAD_MIN_FRACTION = 1e-12
+"""Relative mean distance of joint centres from their centroid below which they are one point."""
 
 
 class JointType(StrEnum):
@@ -185,11 +188,11 @@ class Joint(Value):
 
 @dataclass(frozen=True)
 class Coupling:
-    """Coupling: coordinate of the joint that carries ``successor`` = ratio × that of the carrier of ``predecessor``."""
+    """Coupling: coordinate of the joint ``driven`` = ratio × that of the joint ``driver``, both of one dof."""
 
     name: str
-    predecessor: str
-    successor: str
+    driver: str
+    driven: str
     ratio: float
     line: int | None = field(default=None, compare=False)
 
@@ -203,6 +206,10 @@ class Note:
     text: str
     base: bool = False
     """The note is about the assumed base."""
+    count: int = 1
+    """Number of elements or relations that are read in another way; 0 for the details of another note."""
+    change: float = 0.0
+    """Largest change of the geometry (characteristic lengths, rad)."""
 
     def __str__(self) -> str:
         return f"{self.kind}: {self.text}"
@@ -224,6 +231,12 @@ NAMED = PlatformChoice("file", "named in the file")
 GIVEN = PlatformChoice("option", "given by --platform")
 FIRST = PlatformChoice("file", "the first of the bodies that observe or are observed")
 """Choice of a formation."""
+
+
+OPEN_MOTORS_MAX = 12
+"""Number of joints of an open chain above which they are not proposed as motors: its loops are probably not closed."""
+UNCLOSED_MOTORS_MAX = 6
+"""The same number where frames are close to each other, which a closure may join."""
 
 
 def infer_motors(base: str, joints: Sequence[Any]) -> tuple[list[str], str]:
@@ -305,6 +318,14 @@ class Mechanism(Result, shown_as="robot"):
         names."""
         return Result.public("to_pinocchio")(self)
 
+    def to_mujoco(self) -> Any:
+        """Return the robot as ``hrsynth.to_mujoco`` does, a ``mujoco.MjModel``."""
+        return Result.public("to_mujoco")(self)
+
+    def to_urdf(self) -> str:
+        """Return the robot as ``hrsynth.to_urdf`` does, the text of its own file."""
+        return str(Result.public("to_urdf")(self))
+
     def said(self) -> tuple[Any, ...]:
         """Everything except where it was read from: two mechanisms with the same links, joints and observations are
         equal."""
@@ -330,6 +351,9 @@ class Mechanism(Result, shown_as="robot"):
                     raise BadMechanism(f"joint {joint.name!r}: unknown link", link, sorted(self.links))
             if joint.predecessor == joint.successor:
                 raise BadMechanism(f"joint {joint.name!r} connects a link to itself", joint.predecessor)
+        for name in self.coupled_joints:
+            if name not in self.joints or not self.joints[name].in_tree or self.joints[name].type.freedoms != 1:
+                raise BadMechanism("coupling of a joint", name, "one-dof joints of the spanning tree")
         for role, link in (("base", self.base), ("platform", self.platform), ("camera", self.reference)):
             if link not in self.links:
                 raise BadMechanism(f"unknown {role} link", link, sorted(self.links))
@@ -379,12 +403,16 @@ class Mechanism(Result, shown_as="robot"):
         names, which = infer_motors(self.base, list(self.joints.values()))
         if not names or any(joint.is_actuated for joint in self.joints.values()):
             return None
+        unclosed = any(note.kind == "open" and "frames close to each other" in note.text for note in self.notes)
+        most = UNCLOSED_MOTORS_MAX if unclosed else OPEN_MOTORS_MAX
+        if all(joint.in_tree for joint in self.joints.values()) and len(names) > most:
+            return f"no joint has a motor, and {len(names)} move independently: close the loops first (--close A:B)"
         return f"no joint has a motor: try --motors {','.join(names)} ({which})"
 
     def require_motors(self) -> None:
         """Raise ``BadRequest`` if no joint has a motor."""
         if not any(joint.is_actuated for joint in self.joints.values()):
-            told = (self.proposed_motors or "").removeprefix("no joint has a motor: ")
+            told = (self.proposed_motors or "").removeprefix("no joint has a motor").lstrip(":, ")
             raise BadRequest(f"{self.name}: no motor", remedy=f"Name one or more with --motors{told and f': {told}'}.")
 
     @cached_property
@@ -392,12 +420,15 @@ class Mechanism(Result, shown_as="robot"):
         """Links in order, each with its neighbours."""
         return build_adjacency(self.links, (joint.links for joint in self.joints.values()))
 
-    def carrier(self, coupling: Coupling, link: str) -> Joint:
-        """Return the joint whose coordinate a coupling means by a link. Raises ``BadMechanism`` if there is none."""
-        for joint in self.joints.values():
-            if joint.successor == link and joint.in_tree and joint.type.freedoms == 1:
-                return joint
-        raise BadMechanism(f"coupling {coupling.name!r}: no single joint carries the link", link)
+    @cached_property
+    def coupled_joints(self) -> frozenset[str]:
+        """Joints whose coordinates are coupled; none of them can be a part of another joint."""
+        return frozenset(name for pair in self.couplings for name in (pair.driver, pair.driven))
+
+    @property
+    def coupled_links(self) -> set[str]:
+        """Links of coupled joints."""
+        return {link for name in self.coupled_joints for link in self.joints[name].links}
 
     @cached_property
     def joint_ranges(self) -> dict[str, tuple[float, float]]:
@@ -490,7 +521,7 @@ class Mechanism(Result, shown_as="robot"):
             name: joint for name, joint in self.joints.items() if name not in dropped and not gone & set(joint.links)
         }
         new_joints.update({joint.name: joint for joint in joints})
-        kept = tuple(c for c in self.couplings if {c.predecessor, c.successor} <= set(new_links))
+        kept = tuple(c for c in self.couplings if {c.driver, c.driven} <= set(new_joints))
         fields.setdefault("couplings", kept)
         return replace(self, links=new_links, joints=new_joints, **fields)  # type: ignore[arg-type]
 

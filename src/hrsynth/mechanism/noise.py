@@ -8,13 +8,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..budgets import EDGE_NOISE_PIXELS_MAX
 from ..errors import BadRequest
 from ..geometry.vectors import Array
 from ..options import parse_plain_number
-from ..tolerances import NOISE_DIFFERENCE_STEP_MAX
 from .cameras import CameraObservation
 from .observation import Observation
+
+NOISE_DIFFERENCE_STEP_MAX = 1e-5
+"""Noise (radians, metres, fractions of the focal length) of the differences of its first-order effect."""
+EDGE_NOISE_PIXELS_MAX = 50.0
+"""Largest error of an edge (pixels)."""
 
 EXAMPLE = "0.1deg or 0.002 (rad), 0.3px in the image, 1mm of lengths; several with commas"
 UNITS = {"px": ("px", 1.0), "deg": ("rad", math.radians(1)), "mm": ("m", 1e-3), "m": ("m", 1.0), "": ("rad", 1.0)}
@@ -90,7 +93,7 @@ class Noise:
                 and not (isinstance(each, CameraObservation) and each.camera and each.camera.focal)
             ):
                 raise BadRequest(
-                    f"noise in pixels: focal length of the camera of {each.kind} {each.leg}",
+                    f"noise in pixels: focal length of the camera of {each.text}",
                     "none",
                     "a camera with one (--camera NAME=LINK@x,y,z/r,p,y/FOCAL)",
                 )

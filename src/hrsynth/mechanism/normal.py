@@ -105,15 +105,11 @@ def _merge_fixed(mechanism: Mechanism, into: dict[str, str]) -> Mechanism:
             joints[joint.name] = moved
     links = {name: link for name, link in mechanism.links.items() if name not in gone}
     links.update({link.name: link for link in kept_links})
-    couplings = tuple(
-        replace(c, predecessor=into[c.predecessor], successor=into[c.successor]) for c in mechanism.couplings
-    )
     return replace(
         mechanism,
         links=links,
         joints=joints,
         observations=observations,
-        couplings=couplings,
         camera=None if mechanism.camera is None else into[mechanism.camera],
         cameras=cameras,
     )
@@ -123,9 +119,7 @@ def _find_next_merge(mechanism: Mechanism) -> tuple[list[str], list[Joint], Join
     """Return the links between, the joints that go, and the joint that replaces them; a U of two R with distant centres
     only if nothing else merges, as axes of two spherical joints on one rod may meet as well."""
     far: tuple[list[str], list[Joint], Joint] | None = None
-    held = _list_protected_names(mechanism) | {
-        link for c in mechanism.couplings for link in (c.predecessor, c.successor)
-    }
+    held = _list_protected_names(mechanism) | mechanism.coupled_links
     free = [name for name in mechanism.links if name not in held and len(mechanism.joints_of(name)) == 2]
     for x in free:
         first, second = mechanism.joints_of(x)
@@ -156,13 +150,14 @@ def _pair(mechanism: Mechanism, a: Joint, b: Joint) -> Joint | None:
     kinds = a.type.value + b.type.value
     if kinds == "RR":
         if lines.is_parallel(a.axis, b.axis):
-            return _join(a, b) if lines.measure_line_distance(b.point, a.point, a.axis) <= near else None
+            is_coaxial = lines.measure_line_distance(b.point, a.point, a.axis) <= near
+            return _join(a, b, a.type, a.point, a.axes) if is_coaxial else None
         centre = lines.find_meeting_point([(a.point, a.axis), (b.point, b.axis)], near)
         if centre is not None and lines.is_perpendicular(a.axis, b.axis):
             turns = () if a.limits is b.limits is None else ((a.name, a.limits), (b.name, b.limits))
             return _join(a, b, JointType.UNIVERSAL, centre, (a.axis, b.axis), turns=turns)
     elif kinds == "PP" and lines.is_parallel(a.axis, b.axis):
-        return _join(a, b)
+        return _join(a, b, a.type, a.point, a.axes)
     elif kinds in ("RU", "UR"):
         centre, arm = (a.point, b) if a.type is JointType.UNIVERSAL else (b.point, a)
         if lines.measure_line_distance(centre, arm.point, arm.axis) <= near:
@@ -182,27 +177,15 @@ def _pair(mechanism: Mechanism, a: Joint, b: Joint) -> Joint | None:
 def _join(
     a: Joint,
     b: Joint,
-    type: JointType | None = None,
-    point: Array | None = None,
+    type: JointType,
+    point: Array,
     axes: tuple[Array, ...] = (),
     wrist: TiltLimit | None = None,
     turns: tuple[tuple[str, Limits | None], ...] = (),
 ) -> Joint:
-    """Return one joint from a's predecessor to b's successor, without limits; by default of a's type and centre."""
-    if type is None or point is None:
-        return replace(a, predecessor=a.predecessor, successor=b.successor, limits=None, offset=None)
-    return replace(
-        a,
-        type=type,
-        point=point,
-        axes=axes,
-        predecessor=a.predecessor,
-        successor=b.successor,
-        limits=None,
-        wrist=wrist,
-        turns=turns,
-        offset=None,
-    )
+    """Return one joint from a's predecessor to b's successor, without limits."""
+    joint = replace(a, successor=b.successor, limits=None, offset=None)
+    return replace(joint, type=type, point=point, axes=axes, wrist=wrist, turns=turns)
 
 
 def _compute_tilt_limit(*joints: Joint) -> TiltLimit | None:

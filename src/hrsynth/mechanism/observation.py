@@ -77,6 +77,11 @@ class Observation(Value):
         return (self.leg, self.link)
 
     @property
+    def text(self) -> str:
+        """Leg and kind, for messages."""
+        return f"observation {self.leg} ({self.kind})"
+
+    @property
     def is_segment_direction(self) -> bool:
         """It is a direction relative to the mechanism's reference link: the subject of the rules for segments."""
         return False
@@ -134,15 +139,13 @@ class Observation(Value):
         cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array, V_links: Array
     ) -> tuple[Array, Array]:
         """Return these at several configurations, poses (n, 4, 4) and (n, k, 4, 4): (n, rows), (n, rows, columns)."""
-        found = [
-            cls.together(observations, *each) for each in zip(X_reference, X_links, V_reference, V_links, strict=True)
-        ]
+        members = zip(X_reference, X_links, V_reference, V_links, strict=True)
+        found = [cls.together(observations, *member) for member in members]
         return np.array([values for values, _ in found]), np.array([rates for _, rates in found])
 
     def carried_by(self, into: Mapping[str, str], poses: Mapping[str, Array]) -> Self:
         """Return the measurement where links became parts of others: ``into[old]``; ``poses`` are X_BL at zero."""
-        seen_from = None if self.seen_from is None else into[self.seen_from]
-        return replace(self, link=into[self.link], seen_from=seen_from)
+        return replace(self, link=into[self.link], seen_from=None if self.seen_from is None else into[self.seen_from])
 
     def to_dict(self) -> ObservationRecord:
         """Return the record of the observation."""
@@ -150,8 +153,7 @@ class Observation(Value):
 
     def differences(self, other: Observation, tolerance: float) -> list[str]:
         """Return the differences from another observation as texts."""
-        same = type(self) is type(other) and self.key == other.key
-        return [] if same else [f"observation of leg {self.leg}: {self!r} / {other!r}"]
+        return [] if type(self) is type(other) and self.key == other.key else [f"{self.text}: {self!r} / {other!r}"]
 
 
 def list_labels(observations: Iterable[Observation]) -> tuple[str, ...]:

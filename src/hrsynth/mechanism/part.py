@@ -35,11 +35,8 @@ def extract_between(mechanism: Mechanism, base: str, platform: str) -> Mechanism
         o for o in mechanism.observations if o.link in inside and (o.seen_from is None or o.seen_from in inside)
     )
     own = {name for name, joint in mechanism.joints.items() if inside.issuperset(joint.links)}
-    geared = {
-        each: (mechanism.carrier(each, each.predecessor).name, mechanism.carrier(each, each.successor).name)
-        for each in mechanism.couplings
-    }
-    beyond: nx.Graph[str] = nx.Graph(ends for ends in geared.values() if not own.issuperset(ends))
+    geared = [(each.driver, each.driven) for each in mechanism.couplings]
+    beyond: nx.Graph[str] = nx.Graph(ends for ends in geared if not own.issuperset(ends))
     for chain in nx.connected_components(beyond):
         if len(chain & own) > 1:
             raise BadRequest(
@@ -47,7 +44,6 @@ def extract_between(mechanism: Mechanism, base: str, platform: str) -> Mechanism
                 ", ".join(sorted(chain - own)),
                 "a base and a platform with these between them",
             )
-    couplings = tuple(each for each, ends in geared.items() if own.issuperset(ends))
     cameras = tuple(each for each in mechanism.cameras if each.link in inside)
     notes = mechanism.notes
     if gone:
@@ -70,4 +66,4 @@ def extract_between(mechanism: Mechanism, base: str, platform: str) -> Mechanism
         cameras=cameras,
         turns=mechanism.turns if platform == mechanism.platform else None,
     )
-    return kept.changed(remove_links=gone, couplings=couplings)
+    return kept.changed(remove_links=gone)

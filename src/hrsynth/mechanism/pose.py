@@ -15,13 +15,19 @@ from typing import Annotated, Any, Protocol, TypedDict, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..budgets import GRID_CELLS_MAX, JOINT_VALUE_MAX, POSE_VALUE_MAX
 from ..errors import BadRequest
 from ..geometry.vectors import Array, convert_rpy_to_rotation
 from ..options import parse_plain_number
 from ..records import FLAT, As, Record, recorded
 from ..results import Value
-from ..tolerances import HALF_TURN_TOL_RAD, PRINTED_POSE_TOL
+from ..tolerances import POSE_VALUE_MAX, PRINTED_POSE_TOL
+
+HALF_TURN_TOL_RAD = 5e-7
+"""Angle (radians) from -pi within which a rotation is printed as pi."""
+GRID_CELLS_MAX = 100_000
+"""Largest number of cells of a grid of poses; more is taken for a mistake."""
+JOINT_VALUE_MAX = 100.0
+"""Largest joint value (metres, radians) of a request; paths to it use small steps."""
 
 SCALARS = ("x", "y", "z", "phi")
 PARTS = (*SCALARS, "rpy")
@@ -429,6 +435,11 @@ def write_parts(parts: Mapping[str, tuple[float, ...]], degrees: bool = False) -
         else f"{name}={'/'.join(map(_write_number, values))}"
         for name, values in parts.items()
     )
+
+
+def format_coordinates(value: float | Iterable[float]) -> str:
+    """Return the coordinate or coordinates of a joint with six digits and nine decimals."""
+    return "/".join(f"{round(x, 9) + 0.0:.6g}" for x in (value if isinstance(value, Iterable) else (value,)))
 
 
 def _write_number(value: float) -> str:

@@ -70,9 +70,6 @@ class SpaceCircle(CameraObservation):
         one = np.broadcast_to(np.eye(3), (*p.shape, 3))
         return np.concatenate([one, 0 * one], axis=-2), np.concatenate([0 * one, one], axis=-2)
 
-    def in_front(self, X_reference: Array, X_link: Array) -> float:
-        return np.inf if self.camera is None else self.ahead(X_reference, X_link)
-
     @staticmethod
     def error_jets(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
         return [a - b for a, b in zip([*p, *d], wanted.tolist(), strict=True)]

@@ -36,9 +36,6 @@ class PointDepth(MetricPoint):
     def partials(p: Array, d: Array, r: Array) -> tuple[Array | None, Array | None]:
         return np.broadcast_to(np.eye(3)[2:], (*p.shape[:-1], 1, 3)), None
 
-    def in_front(self, X_reference: Array, X_link: Array) -> float:
-        return np.inf if self.camera is None else self.ahead(X_reference, X_link)
-
     @staticmethod
     def error_jets(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
         return [p[2] - float(wanted[0])]

@@ -20,9 +20,8 @@ from ..cameras import (
     ViewGeometry,
     VirtualJoint,
     draw_circle,
-    make_universal,
+    make_ray_chain,
     normalise_rates,
-    require_distance,
 )
 from ..observation import Drawn
 
@@ -68,12 +67,7 @@ class PointDistance(MetricPoint):
         return [force(at.B - at.C, at.B)]
 
     def chain(self, at: ViewGeometry) -> tuple[VirtualJoint, ...]:
-        require_distance(at, at.B, 0.0, f"distance {self.leg!r}", "a point outside of it")
-        return (
-            make_universal(at.C, at.ray, None),
-            VirtualJoint("P", at.C, (at.ray,), actuated=True),
-            VirtualJoint("S", at.B),
-        )
+        return make_ray_chain(at, f"distance {self.leg!r}", None, False, True)
 
     def loci(self, at: ViewGeometry) -> tuple[FixedValueLocus, ...]:
         return (FixedValueLocus(at.B, np.zeros((0, 3)), at.C, float(np.linalg.norm(at.B - at.C))),)

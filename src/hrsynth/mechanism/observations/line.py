@@ -14,7 +14,6 @@ from ...geometry import components
 from ...geometry.jets import Jet
 from ...geometry.screws import find_normals, force, make_couple
 from ...geometry.vectors import Array, Numbers, build_plane_axes, cross, freeze_array, hat, normalise_vector
-from ...tolerances import LINE_CENTRE_DISTANCE_TOL
 from ..cameras import (
     CameraObservation,
     FixedValueLocus,
@@ -29,6 +28,9 @@ from ..cameras import (
 )
 from ..images import rotate_by_noise
 from ..observation import Drawn
+
+LINE_CENTRE_DISTANCE_TOL = 1e-3
+"""Distance (m) up to which an observed line counts as passing through the camera centre."""
 
 
 def make_line_sensor_chain(at: ViewGeometry) -> tuple[VirtualJoint, ...]:

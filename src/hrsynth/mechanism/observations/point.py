@@ -18,9 +18,8 @@ from ..cameras import (
     VirtualJoint,
     make_depth_plane,
     make_plane_locus,
-    make_universal,
+    make_ray_chain,
     normalise_rates,
-    require_distance,
 )
 from ..images import derive_point_slope, project_point, rotate_by_noise, shift_point
 
@@ -81,12 +80,7 @@ class ImagePoint(CameraObservation):
         return [force(n, at.B) for n in find_normals(at.B - at.C)]
 
     def chain(self, at: ViewGeometry) -> tuple[VirtualJoint, ...]:
-        require_distance(at, at.B, 0.0, f"point {self.leg!r}", "a point outside of it")
-        return (
-            make_universal(at.C, at.ray, at.far, actuated=True),
-            VirtualJoint("P", at.C, (at.ray,)),
-            VirtualJoint("S", at.B),
-        )
+        return make_ray_chain(at, f"point {self.leg!r}", at.far, True, False)
 
     def loci(self, at: ViewGeometry) -> tuple[FixedValueLocus, ...]:
         return (make_plane_locus(at.B, at.C, *find_normals(at.ray)),)

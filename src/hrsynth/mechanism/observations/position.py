@@ -20,9 +20,8 @@ from ..cameras import (
     VirtualJoint,
     draw_line_piece,
     make_plane_locus,
-    make_universal,
+    make_ray_chain,
     normalise_rates,
-    require_distance,
 )
 from ..observation import Drawn
 
@@ -45,9 +44,6 @@ class PointPosition(MetricPoint):
     def partials(p: Array, d: Array, r: Array) -> tuple[Array | None, Array | None]:
         return np.broadcast_to(np.eye(3), (*p.shape, 3)), None
 
-    def in_front(self, X_reference: Array, X_link: Array) -> float:
-        return np.inf if self.camera is None else self.ahead(X_reference, X_link)
-
     @staticmethod
     def error_jets(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
         return [a - b for a, b in zip(p, wanted.tolist(), strict=True)]
@@ -61,12 +57,7 @@ class PointPosition(MetricPoint):
         return [force(e, at.B) for e in np.eye(3, dtype=int).astype(at.B.dtype)]
 
     def chain(self, at: ViewGeometry) -> tuple[VirtualJoint, ...]:
-        require_distance(at, at.B, 0.0, f"position {self.leg!r}", "a point outside of it")
-        return (
-            make_universal(at.C, at.ray, at.far, actuated=True),
-            VirtualJoint("P", at.C, (at.ray,), actuated=True),
-            VirtualJoint("S", at.B),
-        )
+        return make_ray_chain(at, f"position {self.leg!r}", at.far, True, True)
 
     def loci(self, at: ViewGeometry) -> tuple[FixedValueLocus, ...]:
         return (make_plane_locus(at.B, at.B, *np.eye(3)),)
