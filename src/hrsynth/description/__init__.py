@@ -8,13 +8,12 @@ import os
 import re
 import tempfile
 from codecs import BOM_UTF8
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from ..budgets import ROBOT_FILE_MAX_BYTES
 from ..errors import (
     AssumedBase,
     AssumedPlatform,
@@ -26,24 +25,39 @@ from ..errors import (
 )
 from ..mechanism.model import Mechanism, Note
 from ..results import with_spelling
-from . import formats
+from ..tolerances import ROBOT_FILE_MAX_BYTES
+from . import formats, xml
 from .example_data import PREFIX, list_examples
-from .file_format import FileFormat
-from .files import convert_to_path, require_same, require_writable, write_whole
+from .file_format import FileFormat, RobotFile
+from .files import convert_to_path, open_regular, require_same, require_writable, write_whole
 from .formats import native
+from .jointgraph import join_names
 from .meshes import carry_meshes, remove_written, write_meshes
 from .overrides import Overrides
 from .reading import read
+from .simulator_models import load_mujoco, write_model
 from .tree import build_spanning_mechanism
 
 if TYPE_CHECKING:
+    from mujoco import MjModel, MjSpec
+    from pinocchio import Model
     from yourdfpy import URDF
 
-__all__ = ["build_spanning_mechanism", "list_examples", "list_robots", "list_save_targets", "load", "native", "save"]
+__all__ = [
+    "build_spanning_mechanism",
+    "list_examples",
+    "list_robots",
+    "list_save_targets",
+    "load",
+    "native",
+    "save",
+    "to_mujoco",
+    "to_urdf",
+]
 
 NAMED = "a path, the name of a shipped robot, example:NAME"
 """Ways to give a robot's file."""
-LOADED = f"{NAMED}, an open file, XML text, a yourdfpy.URDF"
+LOADED = f"{NAMED}, an open file, XML text, a yourdfpy.URDF, a model of MuJoCo or Pinocchio"
 """Objects that are read."""
 ERROR_INPUT_CHARACTERS_MAX = 60
 """Letters of a given value that a message shows."""
@@ -73,7 +87,7 @@ def list_robots() -> dict[str, Path]:
 
 @with_spelling
 def load(
-    robot: str | Path | Mechanism | URDF | IO[str] | IO[bytes],
+    robot: str | Path | Mechanism | URDF | MjSpec | MjModel | Model | tuple[Any, ...] | IO[str] | IO[bytes],
     *,
     base: str | None = None,
     platform: str | None = None,
@@ -85,6 +99,8 @@ def load(
     unit: str | None = None,
     tolerance: float | None = None,
     as_written: bool = False,
+    args: Mapping[str, object] | Iterable[str] | str | None = None,
+    model: str | None = None,
 ) -> Mechanism:
     """Return the mechanism of a robot file, of a robot of the package by its name, or of a given text or object.
 
@@ -93,8 +109,9 @@ def load(
     robot
         Path of a file in any format; name of a robot of the package, or ``example:NAME`` of the package
         example-robot-data; an open file; XML text (any text with ``<``; relative file names in it are not found); a
-        ``yourdfpy.URDF``, read as the file that it writes (a tree, whose closures are given); or a mechanism, which is
-        returned unchanged.
+        ``yourdfpy.URDF``, read as the file that it writes (a tree, whose closures are given); a ``mujoco.MjSpec`` or
+        ``mujoco.MjModel``; a ``pinocchio.Model``, alone or as ``(model, constraint_models)`` or ``(model,
+        constraint_models, q0)``, also what ``to_pinocchio`` returns; or a mechanism, which is returned unchanged.
     base
         Base link. Only the part between base and platform remains.
     platform
@@ -104,7 +121,8 @@ def load(
     observe
         Links to observe at their default segments.
     close
-        Closures ``A:B[:TYPE]`` that make the frames of two links (or points ``A@x,y,z`` in them, m) meet.
+        Closures ``A:B[:TYPE[/AXIS]]`` that make the frames of two links (or points ``A@x,y,z`` in them, m) meet; a
+        joint with an axis needs it, in A's frame: ``A:B:revolute/0,0,1``.
     freeze
         Joints to fix at zero.
     keyframe
@@ -116,6 +134,10 @@ def load(
         (characteristic lengths, rad) are made exact with the least change. Default: from the file's digits.
     as_written
         Keep the numbers of the file as they are.
+    args
+        Arguments of a xacro file: ``{"loops": True}``, or texts ``name:=value``.
+    model
+        Model of an SDFormat file with several.
 
     Returns
     -------
@@ -155,9 +177,11 @@ def load(
         unit=unit,
         tolerance=tolerance,
         as_written=as_written,
+        args=args,
+        model=model,
     )
     if isinstance(robot, Mechanism):
-        if overrides.has_any or tolerance is not None or base is not None or observe is not None:
+        if overrides.has_any or any(value is not None for value in (tolerance, base, observe, args, model)):
             raise BadRequest(
                 "--base, --platform and the other file overrides need a file: this robot is already read",
                 robot.name,
@@ -195,6 +219,10 @@ def _read_content(robot: Any, overrides: Overrides) -> Mechanism:
     elif type(robot).__module__.partition(".")[0] == "yourdfpy" and hasattr(robot, "write_xml_string"):
         data, name = robot.write_xml_string(), ""
         looked_in = getattr(getattr(robot, "_filename_handler", None), "keywords", {}).get("dir")
+    elif written := write_model(robot):
+        data, name = written[0], "robot.xml"
+        if written[1] is not None and overrides.keyframe is None:
+            overrides = replace(overrides, keyframe=written[1])
     else:
         data = None
     decoded = isinstance(data, str)
@@ -260,11 +288,18 @@ def find_robot_file(robot: str | os.PathLike[str]) -> Path:
     if isinstance(robot, str) and not path.suffix and len(path.parts) == 1:
         robots = list_robots()
         with contextlib.suppress(OSError, ValueError):
-            if path.is_file():
+            if path.is_file() and (robot not in robots or _may_be_robot(path)):
                 return path
         if robot in robots or not os.path.exists(robot):
             return _find_named_file(robot, robots, "neither a file nor a shipped robot", "robots")
     return path
+
+
+def _may_be_robot(path: Path) -> bool:
+    """Return True if a file begins as robot files do; any other with the name of a shipped robot does not hide it."""
+    with open_regular(path) as stream:
+        start = stream.read(1000)
+    return xml.may_be_document(start) or formats.recognise(RobotFile(path, None, data=start)) is not None
 
 
 def _find_named_file(name: str, files: dict[str, Path], what: str, command: str) -> Path:
@@ -300,9 +335,9 @@ def save(
         File to write. A file that goes with it is not replaced by other content, nor is a file that is read
         together with one that stays.
     format
-        ``native``, ``gepetto``, ``mjcf``, ``sdf`` or ``usd``. Default: by the extension, ``.urdf`` native,
-        ``.xml`` and ``.mjcf`` MJCF, ``.sdf`` SDFormat, ``.usda``, ``.usd`` and ``.usdc`` USD, ``.yaml`` Gepetto (with a
-        ``.urdf`` of the same name next to it).
+        ``native``, ``gepetto``, ``mjcf``, ``sdf`` or ``usd``, or an added one. Default: by the longest known
+        extension, ``.urdf`` native, ``.xml`` and ``.mjcf`` MJCF, ``.sdf`` SDFormat, ``.usda``, ``.usd`` and ``.usdc``
+        USD, ``.yaml`` Gepetto (with a ``.urdf`` of the same name next to it).
     meshes
         ``keep``: meshes stay and are named from the new file's folder; ``copy``: they are copied to ``meshes/`` next to
         it.
@@ -341,10 +376,89 @@ def save(
             _require_whole(file, contents)
         for file, content in contents.items():
             write_whole(file, content)
+        if chosen.reread:
+            notes += _find_silent_losses(robot, target, listed=bool(found.lost))
     except BaseException:
         remove_written(new)
         raise
     return (*found.lost, *notes)
+
+
+@with_spelling
+def to_urdf(robot: Mechanism | str | Path) -> str:
+    """Return the text of a robot's own file: URDF, with the loops in elements that other readers leave out; also as
+    ``Mechanism.to_urdf()``.
+
+    Parameters
+    ----------
+    robot
+        Mechanism, path of a file, or name of a shipped robot.
+
+    Returns
+    -------
+    str
+        Text that ``load`` reads.
+
+    Examples
+    --------
+    >>> hrsynth.load(hrsynth.to_urdf("3rrr_m1")) == hrsynth.load("3rrr_m1")
+    True
+    """
+    return formats.get_writer("native")(load(robot)).texts[0]
+
+
+@with_spelling
+def to_mujoco(robot: Mechanism | str | Path) -> MjModel:
+    """Return a robot with its loops as a MuJoCo model; also as ``Mechanism.to_mujoco()``.
+
+    Parameters
+    ----------
+    robot
+        Mechanism, path of a file, or name of a shipped robot.
+
+    Returns
+    -------
+    mujoco.MjModel
+        Bodies, joints and motors with the file's names (metres, kilograms, radians), the zero configuration as its
+        reference, an equality for each loop and coupling.
+
+    Raises
+    ------
+    BadRequest
+        If MJCF cannot express the robot.
+    MissingExtra
+        If MuJoCo is not installed.
+
+    Warns
+    -----
+    UserWarning
+        Of what the model lacks, such as limits of loops.
+
+    Examples
+    --------
+    >>> model = hrsynth.to_mujoco("3rrr_m1")
+    >>> model.nv, model.neq, model.nu
+    (7, 4, 3)
+    """
+    mujoco = load_mujoco("a model of MuJoCo")
+    with tempfile.TemporaryDirectory() as folder:
+        file = f"{folder}/robot.xml"
+        for note in save(robot, file):
+            warn_caller(shorten_text(note.text, WARNING_CHARACTERS_MAX), UserWarning)
+        return mujoco.MjModel.from_xml_path(file)
+
+
+def _find_silent_losses(robot: Mechanism, path: Path, *, listed: bool) -> list[Note]:
+    """Return a warning if the written file, read back, is another mechanism. Frames of links may differ, and content if
+    the writer has ``listed`` losses."""
+    free = ("pose of link ", "content of ", "xml of ")[: 3 if listed else 1]
+    try:
+        differences = load(path).differences(build_spanning_mechanism(robot))
+    except HrsynthError as error:
+        differences = [str(error)]
+    differences = [each for each in differences if not each.startswith(free)]
+    text = "the written file, read back, is another mechanism: " + join_names(differences, 3)
+    return [Note("warning", text)] if differences else []
 
 
 def _require_whole(file: Path, others: Iterable[Path]) -> None:
@@ -361,17 +475,16 @@ def _require_whole(file: Path, others: Iterable[Path]) -> None:
 
 
 def _choose_format(target: Path, name: str | None) -> FileFormat:
-    dialects = formats.list_writable_formats()
-    endings = {ending: each.name for each in dialects for ending in each.endings}
-    if name is None and target.suffix.lower() not in endings:
+    dialects = {each.name: each for each in formats.list_writable_formats()}
+    if name is not None and name not in dialects:
+        raise BadRequest("unknown format", name, tuple(dialects))
+    endings = {ending: each for each in dialects.values() for ending in each.endings}
+    matching = [ending for ending in endings if target.name.lower().endswith(ending)]
+    if name is None and not matching:
         raise BadRequest(
             "cannot write the file: its extension belongs to no known format",
             str(target),
             ", ".join(sorted(endings)),
             remedy="Name the format.",
         )
-    wanted = name or endings[target.suffix.lower()]
-    found = next((each for each in dialects if each.name == wanted), None)
-    if found is None:
-        raise BadRequest("unknown format", wanted, tuple(each.name for each in dialects))
-    return found
+    return endings[max(matching, key=len)] if name is None else dialects[name]
