@@ -1,11 +1,11 @@
-"""File format of robots: a folder of ``formats/`` that states how its files are recognised, read and written."""
+"""File format of robots: a module of ``formats/`` that states how its files are recognised, read and written."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
 
 from ..mechanism.model import Mechanism, Note
 from . import xml
@@ -14,23 +14,23 @@ from .jointgraph import JointGraph
 
 @dataclass(frozen=True, eq=False)
 class RobotFile:
-    """Opened file: path, document (None if it is not XML), first bytes, and notes on text that was left out.
-    ``strict``: no override is given, so the file must be complete; ``tolerance``: relations of joints up to it are made
-    exact (None: by the file's digits); ``as_written``: none is; ``as_spelt``: mistyped names pass."""
+    """Opened file: path, document (None if it is not XML), bytes, and notes on text that was left out.
+    ``strict``: no override is given, so the file must be complete; ``as_spelt``: mistyped names pass; ``arguments``:
+    those that a xacro file declares, with their values; ``model``: the name of the one to read."""
 
     path: Path
     root: xml.Element | None
     strict: bool = True
-    start: bytes = b""
+    data: bytes = b""
     notes: tuple[Note, ...] = ()
-    tolerance: float | None = None
-    as_written: bool = False
     as_spelt: bool = False
+    arguments: Mapping[str, str] = field(default_factory=dict)
+    model: str | None = None
 
     @property
     def document(self) -> xml.Element:
         """Return the root element. Raises ``BadRobotFile`` if the file is not XML."""
-        return xml.parse_document(xml.read_bytes(self.path), str(self.path)) if self.root is None else self.root
+        return xml.parse_document(self.data, str(self.path)) if self.root is None else self.root
 
     @property
     def tag(self) -> str | None:
@@ -41,6 +41,11 @@ class RobotFile:
         """Return True if the root has a child element of that name."""
         return self.root is not None and self.root.find(tag) is not None
 
+    def has_key(self, *keys: str) -> bool:
+        """Return True if the file is not XML and has one of these keys of YAML, not indented."""
+        wanted = "|".join(map(re.escape, keys)).encode()
+        return self.root is None and re.search(rb"(?m)^(\{\s*)?[\"']?(%s)[\"']?\s*:" % wanted, self.data) is not None
+
 
 @dataclass(frozen=True)
 class Written:
@@ -50,40 +55,19 @@ class Written:
     lost: tuple[Note, ...] = ()
 
 
-class Read(Protocol):
-    """``read`` in ``read.py``: return a joint graph, assembled as in all formats, or a mechanism."""
-
-    def __call__(self, file: RobotFile) -> JointGraph | Mechanism: ...
-
-
-class Write(Protocol):
-    """``write`` in ``write.py``."""
-
-    def __call__(self, mechanism: Mechanism) -> Written: ...
-
-
-def encode_text(text: str, path: Path) -> bytes:
-    """Return the bytes of a file that is text."""
-    return text.encode()
-
-
-def list_single_file(path: Path) -> tuple[Path, ...]:
-    """Return the files of a format that writes one."""
-    return (path,)
-
-
-def return_no_companion(path: Path) -> Path | None:
-    """Return None: no other file is read together with this one."""
-    return None
+Read = Callable[[RobotFile], JointGraph]
+"""``read`` of a format."""
+Write = Callable[[Mechanism], Written]
+"""``write`` of a format."""
 
 
 @dataclass(frozen=True)
 class FileFormat:
-    """Name of a format (its folder's), how its files are recognised by their content, and the extensions of the files
-    that it writes (none: it is only read). ``files`` are all files written where one is named, the robot first;
-    ``packed`` turns the text of a file into bytes. ``begins`` are the first bytes of files that are not XML, ``meshes``
-    the extensions of meshes that it can name (None: any). ``partner`` is the file on the disk that is read together
-    with one.
+    """Name of a format (its module's), how its files are recognised by their content, and the extensions of the
+    files that it writes (none: it is only read). ``files`` are all files written where one is named, the robot
+    first; ``packed`` turns the text of a file into bytes. ``meshes`` are the extensions of meshes that it can name
+    (None: any). ``partner`` is the file on the disk that is read together with one. ``reread``: a written file is read
+    back, and what differs becomes a warning; False if tests show that the writer lists its losses.
 
     A file has the first format that recognises it, in the order of ``rank``.
     """
@@ -91,9 +75,9 @@ class FileFormat:
     name: str
     knows: Callable[[RobotFile], bool]
     endings: tuple[str, ...] = ()
-    files: Callable[[Path], tuple[Path, ...]] = list_single_file
+    files: Callable[[Path], tuple[Path, ...]] = field(default=lambda path: (path,))
     rank: int = 0
-    begins: tuple[bytes, ...] = ()
-    packed: Callable[[str, Path], bytes] = encode_text
+    packed: Callable[[str, Path], bytes] = field(default=lambda text, path: text.encode())
     meshes: tuple[str, ...] | None = None
-    partner: Callable[[Path], Path | None] = return_no_companion
+    partner: Callable[[Path], Path | None] = field(default=lambda path: None)
+    reread: bool = True

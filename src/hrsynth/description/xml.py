@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+from codecs import BOM_UTF8
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -12,16 +13,19 @@ from typing import Any, TypeAlias
 
 from lxml import etree
 
-from ..budgets import (
-    ROBOT_FILE_MAX_BYTES,
-    XML_ATTRIBUTES_MAX,
-    XML_ELEMENT_NAMES_MAX,
-    XML_ELEMENTS_MAX,
-    XML_REPARSES_MAX,
-)
 from ..errors import BadRequest, BadRobotFile, Defect
 from ..mechanism.model import Note
+from ..tolerances import ROBOT_FILE_MAX_BYTES
 from .files import NotRegular, open_regular
+
+XML_ELEMENTS_MAX = 100_000
+"""Elements above which an XML document is not parsed."""
+XML_ELEMENT_NAMES_MAX = 1000
+"""Different names of elements above which an XML document is refused: the largest format, MJCF, has 150."""
+XML_ATTRIBUTES_MAX = 200
+"""Attributes of an element above which an XML document is refused: the most in any format are 50."""
+XML_REPARSES_MAX = 16
+"""Number of times a document is parsed again without the construct that stopped the parser."""
 
 Element: TypeAlias = etree._Element
 
@@ -31,6 +35,19 @@ _PREFIX = re.compile(r"Namespace prefix (?P<prefix>[A-Za-z_][\w.-]*) (?:on|for) 
 _ROOT = re.compile(rb"(?:\xef\xbb\xbf)?(?:\s+|<\?.*?\?>|<!--.*?-->)*<[^\s/>]+", re.DOTALL)
 _BREAK = re.compile(rb"&#0*(?:9|10|13);|&#x0*[9aAdD];")
 """Tabs and line breaks as references: they are read as spaces, like plain ones."""
+_STAND_INS = (
+    (
+        re.compile(rb"version https://git-lfs\.github\.com/spec/"),
+        "a Git LFS pointer instead of the file",
+        "the file that git lfs pull fetches",
+    ),
+    (
+        re.compile(rb"(?:\xef\xbb\xbf)?(?>\s|<\?.*?\?>|<!--.*?-->)*<(?:!doctype\s+)?html\b", re.DOTALL | re.IGNORECASE),
+        "a web page, saved instead of the file",
+        "the file itself, from its raw or download link",
+    ),
+)
+"""Starts of what is downloaded instead of a file, what it is, and what is expected."""
 _DECLARATION = re.compile(rb"<!\s*(DOCTYPE|ENTITY)")
 
 _ATTRIBUTE = re.compile(r"@(?P<name>(\{[^}]*\})?[^=]*)=(?P<value>.*)", re.DOTALL)
@@ -67,7 +84,15 @@ def read_bytes(path: str | Path) -> bytes:
         ) from None
     if len(data) > ROBOT_FILE_MAX_BYTES:
         raise make_file_error(path, "file too large", most, value=f"more than {ROBOT_FILE_MAX_BYTES} bytes")
+    for start, what, remedy in _STAND_INS:
+        if start.match(data):
+            raise make_file_error(path, what, remedy)
     return data
+
+
+def may_be_document(data: bytes) -> bool:
+    """Return True if a file begins as XML does."""
+    return data.removeprefix(BOM_UTF8).lstrip().startswith(b"<")
 
 
 def parse_document(text: bytes | str, file: str, notes: list[Note] | None = None) -> Element:
@@ -103,7 +128,7 @@ def parse_document(text: bytes | str, file: str, notes: list[Note] | None = None
             root = etree.fromstring(data, _make_parser())
             _require_few_names(root, file)
             if root.getroottree().docinfo.internalDTD is None:
-                return root
+                return _drop_default_namespace(root)
             what, at = "a document type declaration is not allowed", 1
         except etree.XMLSyntaxError as error:
             what, at = (error.msg or "syntax error").split(", line ")[0], error.lineno or 1
@@ -135,6 +160,16 @@ def _require_few_names(root: Element, file: str) -> None:
         raise make_file_error(
             file, "too many different elements", f"up to {XML_ELEMENT_NAMES_MAX}", value=str(len(names))
         )
+
+
+def _drop_default_namespace(root: Element) -> Element:
+    """Return the document without default namespaces, which mean nothing in robot files; prefixes stay."""
+    bare = [element for element in root.iter("*") if element.tag.startswith("{") and not element.prefix]
+    for element in bare:
+        element.tag = etree.QName(element).localname
+    if bare:
+        etree.cleanup_namespaces(root, keep_ns_prefixes=[prefix for prefix in root.nsmap if prefix])
+    return root
 
 
 def _repair_document(data: bytes, what: str, notes: list[Note]) -> bytes:

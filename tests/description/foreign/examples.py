@@ -269,5 +269,18 @@ EXTENDED: dict[str, dict[str, str]] = {
         .replace('"s"', '"cl1_a"')
         .replace('"t"', '"cl1_b"')
     },
+    "copies": {
+        "robot.xml": MJCF["connect"].replace(
+            "<worldbody>",
+            '<tendon><fixed name="t"><joint joint="k" coef="1"/><joint joint="l" coef="2"/></fixed></tendon><equality>'
+            '<tendon tendon1="t"/></equality><worldbody><replicate count="3" euler="0 0 120"><body name="p">'
+            '<joint name="k"/><body name="q" pos="1 0 0"><joint name="l"/></body></body></replicate>',
+        )
+    },
+    "attached": {
+        "robot.xml": '<mujoco><asset><model name="m" file="child.xml"/></asset><worldbody><body><joint/>'
+        '<attach model="m" prefix="x"/></body></worldbody></mujoco>',
+        "child.xml": MJCF["connect"],
+    },
 }
 """Closures in words that only some tools know: damaged, too."""

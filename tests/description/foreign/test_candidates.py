@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import hrsynth
 from description.foreign.examples import TREE, A, B, C, D, _frame, urdf, words
 from description.foreign.test_dialects import lines, mobility
 from hrsynth.analysis.pose_requests import observe
@@ -111,3 +112,20 @@ def test_the_nearest_come_first_and_rounding_counts_as_meeting(tmp_path: Path):
     assert [each.coincides for each in found] == [True, False]
     assert found[1].distance == pytest.approx(0.01)
     assert set(found[1].links) == {"far", "eye"}
+
+
+@pytest.mark.parametrize(("links", "frames", "told"), [(7, True, True), (13, False, True), (7, False, False)])
+def test_motors_of_a_robot_with_open_loops_are_not_proposed(links: int, frames: bool, told: bool, tmp_path: Path):
+    path = tmp_path / "robot.urdf"
+    text = chain(np.random.default_rng(3), links)
+    path.write_text(text if frames else text[: text.index('<link name="hook"')] + "</robot>")
+    said = str(load(path, platform=f"k{links}").proposed_motors)
+    assert ("close the loops first" in said) is told
+    assert (f"{links} move independently" in said) is told
+    if frames:
+        robot = load(path, platform=f"k{links}", close="hook:eye")
+        assert str(robot.proposed_motors).startswith("no joint has a motor: try --motors j0")
+        assert not any("open chain" in note.text for note in robot.notes)
+        findings = hrsynth.lint(path, platform=f"k{links}", close="hook:eye").findings
+        assert not any(each.rule == "frames-coincide" for each in findings)
+        assert any(each.rule == "frames-coincide" for each in hrsynth.lint(path).findings)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hrsynth
+from description.foreign.test_dialects import mobility
 from hrsynth.description import load
 from hrsynth.mechanism import Mechanism
 
@@ -133,3 +134,57 @@ def test_a_singular_zero_pose_is_left_by_a_small_step(legs: int, tmp_path: Path)
     stayed = load(path, platform="shin_b0", keyframe="zero")
     assert moved_by(stayed) == 0
     assert not any(note.kind == "solved" for note in stayed.notes)
+
+
+def four_bar(folder: Path, seed: int, dialect: str) -> Path:
+    """A planar four-bar about y that a hinge would close and a rigid closure locks: of links of random lengths, on a
+    free hinge of its own."""
+    rng = np.random.default_rng(seed)
+    crank, rod, ground = rng.uniform(0.1, 0.3, size=(3, 2)).round(4)
+    tip = crank + rod - ground
+    chain = [("turn", "base", "frame", (0, 0)), ("crank", "frame", "a", (0, 0)), ("knee", "a", "b", crank)]
+    chain += [("rocker", "frame", "c", ground)]
+    if dialect == "gepetto":
+        joint = (
+            '<link name="{2}"/><joint name="{0}" type="continuous"><parent link="{1}"/><child link="{2}"/>'
+            '<origin xyz="{3} 0 {4}"/><axis xyz="0 1 0"/></joint>'
+        ).format
+        frame = (
+            '<link name="{0}"/><joint name="at_{0}" type="fixed"><parent link="{1}"/><child link="{0}"/>'
+            '<origin xyz="{2} 0 {3}"/></joint>'
+        ).format
+        (folder / "robot.urdf").write_text(
+            '<robot name="bars"><link name="base"/>'
+            + "".join(joint(name, parent, child, *at) for name, parent, child, at in chain)
+            + frame("end_b", "b", *rod)
+            + frame("end_c", "c", *tip)
+            + "</robot>"
+        )
+        (folder / "robot.yaml").write_text("closed_loop: [[end_b, end_c]]\ntype: [6d]\nname_mot: [turn, crank]\n")
+        return folder / "robot.urdf"
+    body = '<body name="{2}" pos="{3} 0 {4}"><joint name="{0}" axis="0 1 0"/><geom size=".01"/>'.format
+    turn, first, second, other = (body(name, parent, child, *at) for name, parent, child, at in chain)
+    (folder / "robot.xml").write_text(
+        f'<mujoco><worldbody>{turn}{first}{second}<site name="at_b" pos="{rod[0]} 0 {rod[1]}"/></body></body>{other}'
+        f'<site name="at_c" pos="{tip[0]} 0 {tip[1]}"/></body></body></worldbody>'
+        '<equality><weld name="loop_1" site1="at_b" site2="at_c"/></equality></mujoco>'
+    )
+    return folder / "robot.xml"
+
+
+@pytest.mark.parametrize("dialect", ["gepetto", "mjcf"])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_closure_that_locks_its_loop_is_named_with_one_that_does_not(seed: int, dialect: str, tmp_path: Path):
+    """Four bodies in a plane with five hinges have two freedoms; rigid in place of the last one, one (Gruebler)."""
+    path = four_bar(tmp_path, seed, dialect)
+    robot = load(path, platform="b")
+    (text,) = (note.text for note in robot.notes if "locks" in note.text)
+    locked = text.removeprefix("the closure 'loop_1' locks ").partition(";")[0]
+    assert {*locked.split(", ")} == {"crank", "knee", "rocker"}
+    assert mobility(robot) == 3 * 4 - 2 * 4 - 3
+    option = text.partition("--close ")[2].rstrip(")")
+    freed = load(path, platform="b", close=option)
+    assert mobility(freed) == 3 * 4 - 2 * 5
+    assert not any("locks" in note.text for note in freed.notes)
+    found = [each for each in hrsynth.lint(path, platform="b").findings if each.rule == "closure-locks"]
+    assert [option in each.message for each in found] == [True]

@@ -121,7 +121,7 @@ def test_a_bushing_that_is_no_joint_of_loops_is_told(tmp_path: Path):
         "</drake:linear_bushing_rpy>"
     )
     robot = read(tmp_path, DRAKE.replace("</robot>", text + "</robot>"), platform="bar")
-    assert any("--close rocker:bar:TYPE" in each for each in notes(robot, "open"))
+    assert any("--close rocker:bar:spherical" in each for each in notes(robot, "open"))
     assert mobility(robot) == 3
 
 
@@ -144,7 +144,7 @@ def test_a_detachable_joint_of_gazebo_holds_links_as_they_lie(model: str, tmp_pa
     robot = read(tmp_path, text, platform="bar")
     if model.startswith("name"):
         assert mobility(robot) == 4
-        assert any("--close pin:bar:TYPE" in each for each in notes(robot, "open"))
+        assert any("--close pin:bar:fixed" in each for each in notes(robot, "open"))
         eye = (
             f'<link name="eye"/><joint name="eye_fixed" type="fixed"><parent link="bar"/><child link="eye"/>'
             f'<origin xyz="{at("bar", C)}" rpy="{_rpy(X["bar"][:3, :3].T @ X["rocker"][:3, :3])}"/></joint>'

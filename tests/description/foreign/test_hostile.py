@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from description.foreign.examples import FILES, MJCF, SDF, URDF
-from hrsynth.budgets import FILE_DEFECTS_MAX
 from hrsynth.description import load
+from hrsynth.description.elements import FILE_DEFECTS_MAX
 from hrsynth.description.xml import _find_comments as comments
 from hrsynth.errors import HrsynthError, MissingExtra
 
@@ -306,7 +306,8 @@ def test_a_group_of_shapes_is_a_number(tmp_path: Path):
 
 def test_what_is_no_robot_file_or_folder(tmp_path: Path):
     assert_refused(made(tmp_path, "<html/>", "page.xml"))
-    assert_refused(made(tmp_path, "a: 1", "alone.yaml"), "no URDF files next to")
+    assert_refused(made(tmp_path, "a: 1", "alone.yaml"), "no known format", "gepetto")
+    assert_refused(made(tmp_path, "# loops\ntype: [3d]", "alone.yaml"), "no URDF files next to")
     for text, name in ((ONE["urdf"], "a.urdf"), (ONE["sdf"], "b.sdf")):
         made(tmp_path / "two" if (tmp_path / "two").is_dir() else _folder(tmp_path / "two"), text, name)
     with pytest.raises(HrsynthError, match="a folder with 2 robot files"):

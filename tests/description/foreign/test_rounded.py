@@ -12,11 +12,12 @@ import pytest
 
 import hrsynth
 from description.foreign.rounded import ENDINGS, exported, in_millimetres, of_hinges
+from description.foreign.test_dialects import mobility
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import list_robots, load, save
 from hrsynth.description.assembly.geometry_repair import nearest, snap_geometry
 from hrsynth.description.numerals import Digits
-from hrsynth.errors import BadRequest, LoopClosureFailure, UndecidedStructure
+from hrsynth.errors import BadRequest, LoopClosureFailure, RoundingLimitedRank, UndecidedStructure
 from hrsynth.geometry.vectors import build_pose, normalise_vector, rotate_about_axis
 from hrsynth.mechanism import JointType, Mechanism
 from hrsynth.mechanism.normal import reduce_to_normal_form
@@ -243,6 +244,45 @@ def test_two_structures_equally_near_are_refused_with_advice(tmp_path: Path):
     assert "6 U" in str(caught.value)
     coarse = reduce_to_normal_form(load(path, platform=robot.platform, tolerance=5e-3)).mechanism
     assert sum(j.type is JointType.UNIVERSAL for j in coarse.joints.values()) == 6
+
+
+def test_geometry_near_a_parallelogram_is_refused_with_the_tolerance_that_decides(tmp_path: Path):
+    """Three parallel rods of nearly the same length: a structure that moves to first order. Screws of three parallel
+    forces have rank two, so a plate that equal ones carry has one freedom."""
+    rng, refused = np.random.default_rng(3), dict[Path, RoundingLimitedRank]()
+    for number in range(6):
+        angle, lengths = rng.uniform(0.4, 1.2), 0.04 * (1 + np.array([0.0, 1e-3, -1e-3]))
+        along = np.array([np.cos(angle), np.sin(angle)])
+        at = np.array([[0.0, 0.0], [0.03, 0.004], [-0.03, 0.009]])
+        forces = np.array([[*along, x * along[1] - y * along[0]] for x, y in at])
+        assert np.linalg.matrix_rank(forces, 1e-9) == 2
+        tips = at + lengths[:, None] * along
+        sites, rods, connects = "", "", ""
+        for k in range(1, 3):
+            x, z = tips[k] - tips[0]
+            for name, y in (("one", 0), ("two", 0.1)):
+                sites += f'<site name="{name}{k}" pos="{at[k][0]:.7f} {y} {at[k][1]:.7f}"/>'
+            rods += f'<body pos="{x:.7f} 0 {z:.7f}"><joint name="rod{k}" axis="0 1 0"/><geom size=".01"/>'
+            for name, y in (("one", 0), ("two", 0.1)):
+                rods += (
+                    f'<site name="end_{name}{k}" pos="{at[k][0] - tips[k][0]:.7f} {y} {at[k][1] - tips[k][1]:.7f}"/>'
+                )
+                connects += f'<connect site1="end_{name}{k}" site2="{name}{k}"/>'
+            rods += "</body>"
+        path = tmp_path / f"plate{number}.xml"
+        path.write_text(
+            f'<mujoco><worldbody>{sites}<body name="rod0"><joint name="foot" axis="0 1 0"/><geom size=".01"/>'
+            f'<body name="plate" pos="{tips[0][0]:.7f} 0 {tips[0][1]:.7f}"><joint name="head" axis="0 1 0"/>'
+            f'<geom size=".01"/>{rods}</body></body></worldbody><equality>{connects}</equality></mujoco>'
+        )
+        try:
+            load(path, platform="plate")
+        except RoundingLimitedRank as error:
+            refused[path] = error
+    assert len(refused) > 2  # of others the digits decide
+    for path, error in refused.items():
+        assert f"--tolerance {error.tolerance:g}" in str(error)
+        assert mobility(load(path, platform="plate", tolerance=error.tolerance)) == 3 - 2
 
 
 def test_as_written_nothing_is_made_exact(tmp_path: Path):

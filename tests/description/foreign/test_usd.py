@@ -431,7 +431,7 @@ def test_joints_and_bodies_of_one_name_keep_their_motors(tmp_path: Path):
         + 'def MjcActuator "act" {\n rel mjc:target = </r/crank_j/crank>\n}\n'
     )
     robot = read(tmp_path, arm)
-    assert [(c.predecessor, c.successor, c.ratio) for c in robot.couplings] == [("crank", "tool", 2.0)]
+    assert [(c.driver, c.driven, c.ratio) for c in robot.couplings] == [("crank", "wrist", 2.0)]
     assert [robot.joints[name].successor for name in robot.joints if robot.joints[name].is_actuated] == ["crank"]
 
 
@@ -506,3 +506,31 @@ def test_every_type_has_its_place():
     from hrsynth.description.formats.usd.write import _FREE
 
     assert {kind: len(free) for kind, free in _FREE.items()} == {kind: kind.freedoms for kind in JointType}
+
+
+MISTYPED = {
+    "physics:lowerLimit": "c",
+    "physics:upperLimit": "c",
+    "drive:angular:physics:maxForce": "c",
+    "drive:angular:physics:stiffness": "c",
+    "physics:mass": "bar",
+    "physics:diagonalInertia": "bar",
+    "physics:principalAxes": "bar",
+}
+WRONG = 'string {} = "a"', "string[] {} = ['a', 'b', 'c']", "float[] {} = [1, 2]"
+
+
+@pytest.mark.some(4)
+@pytest.mark.parametrize("value", WRONG)
+@pytest.mark.parametrize("name", MISTYPED)
+def test_attributes_of_another_type_are_ignored_and_told(name: str, value: str, tmp_path: Path):
+    """The robot is the one without them."""
+    plain = four_bar()
+    start = plain.index("{", plain.index(f'"{MISTYPED[name]}" ')) + 1
+    for file, text in (("plain", plain), ("robot", f"{plain[:start]}\n{value.format(name)}\n{plain[start:]}")):
+        (tmp_path / f"{file}.usda").write_text(text)
+    robot = load(tmp_path / "robot.usda", platform="bar")
+    assert robot.differences(load(tmp_path / "plain.usda", platform="bar")) == []
+    assert [f"/r/{MISTYPED[name]}.{name}" in note.text for note in robot.notes if "of their type" in note.text] == [
+        True
+    ]

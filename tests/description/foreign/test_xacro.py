@@ -14,7 +14,8 @@ import hrsynth
 from hrsynth.description import load, native
 from hrsynth.description.formats.urdf.xacro import expand
 from hrsynth.description.formats.urdf.xacro_process import CONSTANTS, MATH, PYTHON, VALUES, Expression
-from hrsynth.errors import BadRobotFile, HrsynthError
+from hrsynth.description.meshes import locate_mesh
+from hrsynth.errors import BadRequest, BadRobotFile, HrsynthError
 
 xacro = pytest.importorskip("xacro")
 
@@ -184,6 +185,7 @@ def test_expressions_have_the_value_that_python_gives(text: str):
         ("none is None", True),
         ("'a,b'.split(',')[1]", "b"),
         ("dict(k=n)['k']", 3),
+        ("list(map(float, '1 2'.split(' ')))", [1.0, 2.0]),
         ("list(range(2))", [0, 1]),
         ("2 ** 3 ** 2", 512),
     ],
@@ -217,6 +219,8 @@ ESCAPES = {
     "await": "await side",
     "an item of a text": "side.real",
     "import": "__import__('os')",
+    "a map of a method": "map(side.upper, [1])",
+    "a map of what is not on the list": "map(eval, ['1'])",
     "eval": "eval('1')",
     "open": "open('MADE', 'w')",
     "getattr": "getattr(side, 'upper')",
@@ -309,7 +313,7 @@ def test_the_environment_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyP
     (tmp_path / "robot.urdf").write_text(
         HEAD + '<link name="a$(optenv HRSYNTH_SECRET none)b$(env HRSYNTH_SECRET)"/></robot>'
     )
-    assert expand(tmp_path / "robot.urdf")[0].get("name") == "anoneb"
+    assert expand(tmp_path / "robot.urdf")[0][0].get("name") == "anoneb"
 
 
 def test_settings_of_the_own_folder_are_read(tmp_path: Path):
@@ -330,23 +334,141 @@ def test_a_package_ends_where_it_says_so(tmp_path: Path):
     inner = tmp_path / "outer" / "package" / "urdf" / "arms"
     inner.mkdir(parents=True)
     path = inner / "robot.urdf"
-    places = {"own": inner, "above": inner.parent, "package": inner.parents[1], "outside": inner.parents[2]}
+    places = {"arms": inner, "urdf": inner.parent, "package": inner.parents[1], "outer": inner.parents[2]}
     for name, folder in places.items():
         (folder / f"{name}.yaml").write_text(f"name: {name}\n")
-    (inner / "link.yaml").symlink_to(tmp_path / "outer" / "outside.yaml")
+    (inner / "link.yaml").symlink_to(tmp_path / "outer" / "outer.yaml")
     (inner / "linked").symlink_to(tmp_path / "outer")
+    (tmp_path / "outer" / "beside").symlink_to(tmp_path)
+    (tmp_path / "secret.yaml").write_text("name: secret\n")
 
     def reads(spec: str) -> bool:
         path.write_text(HEAD + f"<link name=\"a${{load_yaml('{spec}').name}}\"/></robot>")
         try:
-            return expand(path)[0].get("name") != ""
+            return expand(path)[0][0].get("name") != ""
         except BadRobotFile:
             return False
 
-    assert [reads(f"$(find x)/{name}.yaml") for name in places] == [True, True, False, False]
+    assert [reads(f"$(find {name})/{name}.yaml") for name in places] == [True, True, False, False]
     (inner.parents[1] / "package.xml").write_text("<package/>")
-    assert [reads(f"$(find x)/{name}.yaml") for name in places] == [True, True, True, False]
-    assert not any(map(reads, ("$(find x)/etc/hostname", "link.yaml", "linked/outside.yaml", "link*/outside.yaml")))
+    assert [reads(f"$(find {name})/{name}.yaml") for name in places] == [True, True, True, False]
+    assert reads("../urdf.yaml")
+    outside = (
+        "$(find package)/../outer.yaml",
+        "$(find beside)/secret.yaml",
+        "$(find etc)/hostname",
+        "../../../outer.yaml",
+    )
+    assert not any(map(reads, (*outside, "link.yaml", "linked/outer.yaml", "link*/outer.yaml")))
+
+
+FOLDERS = {"a": "a", "b": "b-main", "c": "c"}
+"""Folders of the packages in a workspace; ``c`` is named by its folder alone."""
+RESTS = "x.yaml", "urdf/x.yaml", "urdf/kit/x.yaml"
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Path:
+    """Folder of packages: every file says its path. The folder ``b`` is another package."""
+    for name, folder in FOLDERS.items():
+        for rest in RESTS:
+            path = tmp_path / folder / rest
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(f"name: {folder}/{rest}\n")
+        if name != "c":
+            (tmp_path / folder / "package.xml").write_text(
+                f"<?xml version='1.0'?><package format='2'><!-- <name>c</name> --><name> {name} </name></package>"
+            )
+    (tmp_path / "b").mkdir()
+    (tmp_path / "b" / "package.xml").write_text("<package><name>other</name></package>")
+    return tmp_path
+
+
+@pytest.mark.parametrize("inner", ["urdf/kit", "urdf", "."])
+def test_a_path_in_a_package_names_exactly_one_file(workspace: Path, inner: str):
+    path = workspace / "a" / inner / "robot.urdf"
+    asked = [(name, rest) for name in FOLDERS for rest in RESTS]
+    links = (f"<link name=\"${{load_yaml('$(find {name})/{rest}').name}}\"/>" for name, rest in asked)
+    path.write_text(HEAD + "".join(links) + "</robot>")
+    said = [link.get("name") for link in expand(path)[0]]
+    assert said == [f"{FOLDERS[name]}/{rest}" for name, rest in asked]
+
+
+@pytest.mark.parametrize(
+    ("variable", "root", "found"),
+    [
+        ("AMENT_PREFIX_PATH", "", True),
+        ("AMENT_PREFIX_PATH", "share", False),
+        ("ROS_PACKAGE_PATH", "share/d", True),
+        ("ROS_PACKAGE_PATH", "share", True),
+        ("ROS_PACKAGE_PATH", "", True),
+        ("ROBOT_DESCRIPTIONS_CACHE", "", True),
+    ],
+)
+def test_an_installed_package_is_found(
+    workspace: Path, variable: str, root: str, found: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Files that it names and its meshes; a link out of it leads nowhere."""
+    installed = tmp_path / "installed" / "share" / "d"
+    (installed / "meshes").mkdir(parents=True)
+    (installed / "x.xacro").write_text(HEAD + '<link name="inside"/></robot>')
+    (installed / "meshes" / "near.stl").write_text("solid")
+    (tmp_path / "far.stl").write_text("solid")
+    (installed / "meshes" / "far.stl").symlink_to(tmp_path / "far.stl")
+    path = workspace / "a" / "urdf" / "robot.urdf"
+    path.write_text(HEAD + '<xacro:include filename="$(find d)/x.xacro"/></robot>')
+    for name in ("AMENT_PREFIX_PATH", "ROS_PACKAGE_PATH", "ROBOT_DESCRIPTIONS_CACHE"):
+        monkeypatch.setenv(name, "")
+    with pytest.raises(BadRobotFile, match=r"no package 'd': .*nor in ROS_PACKAGE_PATH"):
+        expand(path)
+    monkeypatch.setenv(variable, str(tmp_path / "installed" / root))
+    mesh = locate_mesh("package://d/meshes/near.stl", path.parent)
+    assert mesh == (installed / "meshes" / "near.stl" if found else None)
+    assert locate_mesh("package://d/meshes/far.stl", path.parent) is None
+    assert locate_mesh("package://d/../../../far.stl", path.parent) is None
+    if found:
+        assert [link.get("name") for link in expand(path)[0]] == ["inside"]
+    else:
+        with pytest.raises(BadRobotFile, match="no package 'd'"):
+            expand(path)
+
+
+@pytest.mark.parametrize("folder", ["a", "b-main"])
+def test_an_absent_package_or_file_is_refused_by_name(workspace: Path, folder: str):
+    path = workspace / folder / "urdf" / "robot.urdf"
+    path.write_text(HEAD + '\n<xacro:include filename="$(find d)/urdf/x.xacro"/></robot>')
+    with pytest.raises(BadRobotFile, match=rf"robot.urdf:3: .*no package 'd': .* up to {folder}/, nor beside"):
+        expand(path)
+    path.write_text(HEAD + '<xacro:include filename="$(find a)/kit/x.yaml"/></robot>')
+    with pytest.raises(BadRobotFile, match=r"No such file or directory: .*/a/kit/x.yaml"):
+        expand(path)
+
+
+def test_a_copy_out_of_a_package_is_read_and_told(tmp_path: Path):
+    """Without a manifest the package is not known: the files beside the file are taken, which is told."""
+    text = MAIN.replace('"parts.xacro"', '"$(find arms_description)/urdf/parts.xacro"')
+    meant = load(written(tmp_path))
+    (tmp_path / "arms.xacro").write_text(text)
+    robot = load(tmp_path / "arms.xacro")
+    assert robot.differences(meant) == []
+    (told,) = {note.text for note in robot.notes} - {note.text for note in meant.notes}
+    assert "the package 'arms_description', which is not here," in told
+    (tmp_path / "package.xml").write_text("<package><name>other</name></package>")
+    with pytest.raises(BadRobotFile, match="no package 'arms_description'"):
+        load(tmp_path / "arms.xacro")
+    (tmp_path / "package.xml").unlink()
+    (tmp_path / "arms.xacro").write_text(MAIN.replace('"parts.xacro"', '"$(find arms_description)/urdf/arms.xacro"'))
+    with pytest.raises(BadRobotFile, match="no package 'arms_description'"):
+        load(tmp_path / "arms.xacro")
+
+
+def test_a_path_without_package_starts_at_the_file_that_says_it(workspace: Path):
+    for folder, name in (("a", "near"), ("b-main", "far")):
+        (workspace / folder / "urdf" / "parts.xacro").write_text(HEAD + f'<link name="{name}"/></robot>')
+    (workspace / "b-main" / "urdf" / "all.xacro").write_text(HEAD + '<xacro:include filename="parts.xacro"/></robot>')
+    path = workspace / "a" / "urdf" / "robot.urdf"
+    path.write_text(HEAD + '<xacro:include filename="$(find b)/urdf/all.xacro"/></robot>')
+    assert [link.get("name") for link in expand(path)[0]] == ["far"]
 
 
 def test_what_the_package_warns_of_is_not_collected(tmp_path: Path):
@@ -357,4 +479,35 @@ def test_what_the_package_warns_of_is_not_collected(tmp_path: Path):
         f'<xacro:if value="${{k}}"><xacro:{name} k="${{k - 1}}"/></xacro:if></xacro:macro>'
         f'<xacro:{name} k="20"/><link name="a"/></robot>'
     )
-    assert expand(path)[0].get("name") == "a"
+    assert expand(path)[0][0].get("name") == "a"
+
+
+@pytest.mark.parametrize("args", [{"wide": 0.45}, ["wide:=0.45"], "wide:=0.45"])
+def test_an_argument_replaces_the_default(tmp_path: Path, args: object):
+    robot = load(written(tmp_path), args=args)
+    meant = load(written(tmp_path, 'default="0.3"', 'default="0.45"'))
+    assert robot.differences(meant) == []
+    assert robot.differences(load(written(tmp_path, 'default="0.3"', 'default="0.3"'))) != []
+    with pytest.raises(BadRequest, match=r"declares no such argument: got 'wid', expected wide"):
+        load(written(tmp_path), args={"wid": 0.4})
+    with pytest.raises(BadRequest, match=r"--arg: got 'wide=0.4', expected NAME:=VALUE"):
+        load(written(tmp_path), args=["wide=0.4"])
+
+
+@pytest.mark.parametrize("value", [True, "true", "1"])
+def test_arguments_of_an_open_file_are_told_and_may_close_it(tmp_path: Path, value: object):
+    declared = MAIN.replace(
+        '<xacro:arg name="wide"', '<xacro:arg name="loops" default="false"/>\n<xacro:arg name="wide"'
+    )
+    text = declared.replace('"${w > 0}"', '"$(arg loops)"', 1).replace("<xacro:unless", "<xacro:if", 1)
+    text = text.replace('"${w > 0}"> <link name="nothing"/> </xacro:unless>', '"false"/>').replace("<hrsynth>", "<!--")
+    (tmp_path / "arms.xacro").write_text(text.replace("</hrsynth>", "-->"))
+    (tmp_path / "parts.xacro").write_text(PARTS)
+    path = tmp_path / "arms.xacro"
+    told = [note.text for note in load(path, platform="dist_1").notes if note.kind == "open"]
+    assert any("now loops:=false, wide:=0.3 (--arg NAME:=VALUE" in each for each in told)
+    robot = load(path, platform="dist_1", args={"loops": value})
+    assert robot.joints["end"].links == ("dist_1", "dist_2")
+    assert hrsynth.check(robot).setup.mobility.total == 2
+    assert not any("--arg" in note.text for note in robot.notes)
+    assert hrsynth.lint(path, args={"loops": value}, platform="dist_1").counts["error"] == 0

@@ -110,6 +110,58 @@ def test_a_regular_zero_pose_is_kept(tmp_path: Path):
     assert not [note for note in robot.notes if note.kind == "solved"]
 
 
+MOVING = {
+    "urdf": '<link name="base"/><link name="a"/><link name="tip"/>'
+    '<joint name="i" type="continuous"><parent link="base"/><child link="a"/></joint>'
+    '<joint name="j" type="continuous"><parent link="a"/><child link="tip"/><axis xyz="0 1 0"/></joint>',
+    "sdf": '<link name="base"/><link name="a"/><link name="tip"/><joint name="i" type="revolute"><parent>base</parent>'
+    '<child>a</child><axis><xyz>1 0 0</xyz></axis></joint><joint name="j" type="revolute"><parent>a</parent>'
+    "<child>tip</child><axis><xyz>0 1 0</xyz></axis></joint>",
+}
+STILL = {
+    "urdf": {
+        "spare": '<link name="spare"/>',
+        "floor": '<link name="{0}"/><link name="floor"/><joint name="w" type="fixed"><parent link="{0}"/>'
+        '<child link="floor"/></joint>',
+    },
+    "sdf": {
+        "spare": '<link name="spare"/>',
+        "floor": '<link name="floor"/><joint name="w" type="fixed"><parent>world</parent><child>floor</child></joint>',
+    },
+}
+FRAMES = {"urdf": '<robot name="r">{}</robot>', "sdf": '<sdf version="1.9"><model name="r">{}</model></sdf>'}
+
+
+@pytest.mark.filterwarnings("ignore::hrsynth.errors.AssumedPlatform")
+@pytest.mark.parametrize("first", [True, False])
+@pytest.mark.parametrize("still", [("spare",), ("floor",), ("spare", "floor")])
+@pytest.mark.parametrize("dialect", FRAMES)
+def test_what_does_not_move_is_never_the_base_of_what_does(
+    dialect: str, still: tuple[str, ...], first: bool, tmp_path: Path
+):
+    parts = "".join(STILL[dialect][each].format("world") for each in still)
+    text = FRAMES[dialect].format(parts + MOVING[dialect] if first else MOVING[dialect] + parts)
+    robot = read(tmp_path, text, dialect)
+    assert robot.differences(read(tmp_path, FRAMES[dialect].format(MOVING[dialect]), dialect)) == []
+    (told,) = [note.text for note in robot.notes if note.kind == "ignored"]
+    assert all(each in told for each in still)
+
+
+@pytest.mark.filterwarnings("ignore::hrsynth.errors.AssumedBase")
+@pytest.mark.parametrize("welded", [0, 1, 3])
+@pytest.mark.parametrize("legs", [2, 3, 5])
+def test_a_robot_floats_wherever_its_legs_are_welded(legs: int, welded: int, tmp_path: Path):
+    """Legs on the bodies that are welded below the floating one: from two on, its six freedoms are left out."""
+    text = ""
+    for k in reversed(range(welded + 1)):
+        hips = (f'<body name="leg{leg}"><joint axis="0 1 0"/><geom size="1"/></body>' for leg in range(legs))
+        below = "".join(hip for leg, hip in enumerate(hips) if leg % (welded + 1) == k)
+        text = f'<body name="b{k}">{"<freejoint/>" if k == 0 else ""}<geom size="1"/>{below}{text}</body>'
+    robot = read(tmp_path, f"<mujoco><worldbody>{text}</worldbody></mujoco>", "xml", platform="leg0")
+    assert robot.base == "b0"
+    assert sum(joint.type.freedoms for joint in robot.joints.values()) == legs
+
+
 TREE = """<mujoco model="tree"><compiler angle="{unit}"/><worldbody>
  <body name="trunk" pos="0 0 1"><freejoint/><geom size="0.1"/>
   <body name="thigh" pos="0.1 0.2 0" euler="{euler}"><joint name="hip" axis="1 2 0" ref="{ref}"/><geom size="0.1"/>

@@ -26,7 +26,7 @@ _ENDS = re.compile(r"link|parent|child|body", re.IGNORECASE)
 """Elements of a plugin that may name the links that it connects."""
 _DETACHABLE = re.compile(r"detachable.?joint", re.IGNORECASE)
 _BUSHING = "bushing_"
-DRAKE = ("ball_constraint", "linear_bushing_rpy")
+DRAKE = ("ball_constraint", "linear_bushing_rpy", "weld_constraint")
 """Elements of Drake that are closures."""
 
 
@@ -70,7 +70,7 @@ def _read_ends(
 
 
 def read_drake(reader: XmlReader, graph: JointGraph, root: xml.Element, frame_of: Frames) -> None:
-    """Add Drake's ball constraints, as points, and its bushings, by the directions of their stiffness."""
+    """Add Drake's ball constraints, as points, its welds, and its bushings, by the directions of their stiffness."""
     for element in filter(is_drake, xml.list_children(root)):
         match strip_namespace(element):
             case "ball_constraint":
@@ -78,11 +78,23 @@ def read_drake(reader: XmlReader, graph: JointGraph, root: xml.Element, frame_of
             case "linear_bushing_rpy":
                 _read_bushing(reader, graph, element, frame_of)
             case name if name.endswith("_constraint"):
-                graph.note(
-                    "open",
-                    f"<drake:{name}> (line {xml.get_line(element)}) is not read; if it connects two links, "
-                    "use --close A@x,y,z:B@x,y,z:TYPE",
-                )
+                _read_other_constraint(graph, element, frame_of)
+
+
+def _read_other_constraint(graph: JointGraph, element: xml.Element, frame_of: Frames) -> None:
+    """Add a weld of two frames, if it holds nothing else; note another constraint, with the links or frames in it."""
+    name, line, children = strip_namespace(element), xml.get_line(element), xml.list_children(element)
+    texts = [(child.get("value") or child.get("name") or child.text or "").strip() for child in children]
+    ends = {text: frame for text in texts if (frame := frame_of(text)) is not None}
+    if name == "weld_constraint" and len(texts) == len(ends) == 2 and len({end.link for end in ends.values()}) == 2:
+        first, second = ends.values()
+        graph.close(graph.fresh("weld_constraint"), JointType.FIXED, (first, second), line=line)
+        return
+    what = f"to close a loop there, use --close {':'.join(ends)}:fixed (or another type)"
+    graph.note(
+        "open",
+        f"<drake:{name}> (line {line}) is not read" + (f"; {what}" if len(ends) == 2 else ": it names no two links"),
+    )
 
 
 def _read_ball_constraint(reader: XmlReader, graph: JointGraph, element: xml.Element, frame_of: Frames) -> None:
@@ -117,7 +129,7 @@ def _read_bushing(reader: XmlReader, graph: JointGraph, element: xml.Element, fr
             "open",
             f"the bushing between {ends[0].link!r} and {ends[1].link!r} is not stiff against "
             f"{len(free[0])} translations and {len(free[1])} rotations, unlike any loop joint, and is left "
-            f"out (--close {links}:TYPE adds a joint)",
+            f"out (--close {links}:spherical, or another type, adds a joint)",
         )
         return
     axis = np.eye(3)[(free[1] or free[0] or (2,))[0]]
@@ -180,7 +192,7 @@ def _read_detachable(
         graph.note(
             "open",
             f"the detachable joint from {parent!r} to {child!r} of the model {model!r}, which may be "
-            f"this robot or another: left out (--close {parent}:{child}:TYPE adds it)",
+            f"this robot or another: left out (--close {parent}:{child}:fixed adds it)",
         )
         return
     if X is None or model in models:

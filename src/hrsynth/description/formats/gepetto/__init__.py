@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ...file_format import FileFormat, RobotFile
-from .settings import ENDINGS, find_partner, find_settings
+from .settings import ENDINGS, KEYS, find_partner, find_settings
 
 
 def _list_files(path: Path) -> tuple[Path, ...]:
@@ -13,7 +13,7 @@ def _list_files(path: Path) -> tuple[Path, ...]:
 
 
 def _is_gepetto_file(file: RobotFile) -> bool:
-    return file.root is None or find_settings(file) is not None
+    return file.has_key(*KEYS) or find_settings(file) is not None
 
 
-DIALECT = FileFormat("gepetto", _is_gepetto_file, ENDINGS, _list_files, rank=-1, partner=find_partner)
+DIALECT = FileFormat("gepetto", _is_gepetto_file, ENDINGS, _list_files, rank=-1, partner=find_partner, reread=False)

@@ -8,10 +8,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ....budgets import LARGEST_BESIDE, MOST_BESIDE, YAML_FILE_MAX_BYTES
 from ....errors import BadRobotFile
 from ... import xml
 from ...file_format import RobotFile
+
+MOST_BESIDE, LARGEST_BESIDE = 50, 3_000_000
+"""Number of sibling files of a kind, and their total size (bytes), above which none is read."""
 
 ENDINGS = (".yaml", ".yml")
 KEYS = ("closed_loop", "type", "name_mot", "joint_name", "joint_type")
@@ -21,37 +23,9 @@ NULL = ("", "~", "null")
 def read_settings(path: Path) -> dict[str, Any] | None:
     """Return the lists of a YAML file, None if it has none of this format's keys. All scalars are read as text, types
     are ignored. Raises ``BadRobotFile``."""
-    import yaml
+    from ...yaml_file import read_yaml
 
-    class Lists(yaml.BaseLoader):
-        """Loader that refuses anything but lists of names as soon as it occurs."""
-
-        count = depth = 0
-
-        def get_event(self) -> Any:
-            event = super().get_event()
-            self.count += 1
-            self.depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-            if (
-                isinstance(event, yaml.AliasEvent)
-                or getattr(event, "tag", None)
-                or self.depth > 6
-                or (self.count > 20_000)
-            ):
-                raise xml.make_file_error(
-                    path, "YAML with aliases, tags, deep nesting or too many entries", "lists of names"
-                )
-            return event
-
-    data = xml.read_bytes(path)
-    try:
-        if len(data) > YAML_FILE_MAX_BYTES:
-            raise xml.make_file_error(path, "YAML file too large", f"up to {YAML_FILE_MAX_BYTES} bytes")
-        found = Lists(data.decode("utf-8")).get_single_data()
-    except (yaml.YAMLError, RecursionError, ValueError, ArithmeticError, LookupError) as error:
-        raise xml.make_file_error(
-            path, f"not YAML: {' '.join(str(error).split())[:120]}", "a whole YAML file"
-        ) from None
+    found = read_yaml(path)
     if not isinstance(found, dict) or not set(KEYS) & set(found):
         return None
     return {key: None if isinstance(value, str) and value in NULL else value for key, value in found.items()}

@@ -4,4 +4,6 @@ from __future__ import annotations
 
 from ...file_format import FileFormat
 
-DIALECT = FileFormat("mjcf", lambda file: file.tag == "mujoco", (".xml", ".mjcf"), meshes=(".stl", ".obj", ".msh"))
+DIALECT = FileFormat(
+    "mjcf", lambda file: file.tag == "mujoco", (".xml", ".mjcf"), meshes=(".stl", ".obj", ".msh"), reread=False
+)

@@ -17,7 +17,7 @@ from ...elements import XmlReader
 from ...jointgraph import join_names
 from .defaults import Compiler, Defaults
 
-_NAMES = {"box": "box", "sphere": "sphere", "cylinder": "cylinder", "capsule": "capsule"}
+_NO_MESH = None, (1.0, 1.0, 1.0)
 
 
 @dataclass
@@ -27,12 +27,15 @@ class BodyContents:
     reader: XmlReader
     compiler: Compiler
     defaults: Defaults
+    root: xml.Element
+    folder: str = ""
+    """Folder of the document, from that of the main one."""
     meshes: dict[str, tuple[str, tuple[float, ...]]] = field(default_factory=dict)
     """File and scale of each mesh, by its name."""
     colours: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        root, folder = self.reader.root, ""
+        root, folder = self.root, ""
         for each in root.findall("compiler"):
             folder = each.get("meshdir", each.get("assetdir", folder))
         for each in root.iterfind("asset/material"):
@@ -42,7 +45,7 @@ class BodyContents:
             if file := given.get("file"):
                 scale = _parse_numbers(given.get("scale"), (1.0, 1.0, 1.0))
                 self.meshes[given.get("name") or PurePosixPath(file).stem] = (
-                    str(PurePosixPath(folder) / file),
+                    str(PurePosixPath(self.folder) / folder / file),
                     scale or (1.0, 1.0, 1.0),
                 )
 
@@ -76,44 +79,26 @@ class BodyContents:
 
     def _solids(self, element: xml.Element, given: Mapping[str, str]) -> list[Solid]:
         kind, X = given.get("type", "mesh" if "mesh" in given else "sphere"), self._place(element)
-        group = given.get("group", "0")
-        roles = (
-            ["visual"]
-            if given.get("contype") == given.get("conaffinity") == "0"
-            else (["collision"] if (_parse_numbers(group, (0.0,)) or (0.0,))[0] >= 3 else ["visual", "collision"])
-        )
-        colour = _parse_numbers(given.get("rgba", self.colours.get(given.get("material", "")) or None), (0.0,) * 4)
-        shown = given.get("rgba") or self.colours.get(given.get("material", ""))
+        file, scale = self.meshes.get(given.get("mesh", ""), _NO_MESH) if kind == "mesh" else _NO_MESH
         sizes = _parse_sizes(given.get("size", ""))
         ends = _parse_numbers(given.get("fromto"), (0.0,) * 6) if "fromto" in given else None
-        if X is None or (kind != "mesh" and kind not in _NAMES):
-            return []
-        if ends is not None and kind in ("cylinder", "capsule") and sizes:
+        if X is not None and ends is not None and kind in ("cylinder", "capsule") and sizes:
             a, b = np.array(ends[:3]), np.array(ends[3:])
-            if not np.linalg.norm(b - a) > 0:
-                return []
-            X, sizes = (
-                freeze_array(build_pose((a + b) / 2, rotate_z_to(b - a))),
-                (sizes[0], float(np.linalg.norm(b - a)) / 2),
-            )
-        if kind == "mesh":
-            if given.get("mesh") not in self.meshes:
-                return []
-            file, scale = self.meshes[given["mesh"]]
-            return [
-                Solid(kind, (), X, role, given.get("name"), colour if shown and role == "visual" else None, file, scale)
-                for role in roles
-            ]
-        count = {"box": 3, "sphere": 1}.get(kind, 2)
-        if len(sizes) < count or not all(size > 0 for size in sizes[:count]):
+            X = freeze_array(build_pose((a + b) / 2, rotate_z_to(b - a))) if np.any(a != b) else None
+            sizes = sizes[0], float(np.linalg.norm(b - a)) / 2
+        halves = {"sphere": (1,), "box": (2, 2, 2), "cylinder": (1, 2), "capsule": (1, 2)}.get(kind, ())
+        whole = tuple(factor * size for factor, size in zip(halves, sizes, strict=False))
+        if X is None or not (file or halves) or len(whole) < len(halves) or not all(size > 0 for size in whole):
             return []
-        whole = {"box": tuple(2 * size for size in sizes[:3]), "sphere": sizes[:1]}.get(
-            kind, (sizes[0], 2 * sizes[-1 if count == 1 else 1])
-        )
-        return [
-            Solid(kind, whole, X, role, given.get("name"), colour if shown and role == "visual" else None)
-            for role in roles
-        ]
+        shown = given.get("rgba") or self.colours.get(given.get("material", ""))
+        colour = _parse_numbers(shown, (0.0,) * 4) if shown else None
+        if given.get("contype") == given.get("conaffinity") == "0":
+            roles = ["visual"]
+        else:
+            group = _parse_numbers(given.get("group"), (0.0,)) or (0.0,)
+            roles = ["collision"] if group[0] >= 3 else ["visual", "collision"]
+        name = given.get("name")
+        return [Solid(kind, whole, X, role, name, colour if role == "visual" else None, file, scale) for role in roles]
 
 
 def _parse_sizes(text: str) -> tuple[float, ...]:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
 
-from ....budgets import INCLUDED_FILES_MAX, ROBOT_FILE_MAX_BYTES
-from ....errors import BadRobotFile
 from ....geometry.vectors import Array, build_pose, rotate_about_axis
 from ... import xml
 from ...elements import XmlReader
 from ...jointgraph import join_names
+from .expand import COPY
 
 Layer: TypeAlias = dict[str, dict[str, str]]
 """Attributes that a class adds, by kind of element."""
@@ -22,12 +20,12 @@ Layer: TypeAlias = dict[str, dict[str, str]]
 class Defaults:
     """Attributes that each class gives to each kind of element; classes are nested and inherit."""
 
-    def __init__(self, reader: XmlReader) -> None:
+    def __init__(self, reader: XmlReader, root: xml.Element) -> None:
         self.reader = reader
         self.classes: dict[str, tuple[Layer, ...]] = {"main": ()}
         self._own: dict[str, Layer] = {}
         self._given: dict[tuple[str, str], dict[str, str]] = {}
-        for element in reader.root.findall("default"):
+        for element in root.findall("default"):
             self._read(element, (), "main")
 
     def _read(self, element: xml.Element, inherited: tuple[Layer, ...], name: str) -> None:
@@ -73,12 +71,14 @@ class Compiler:
     reader: XmlReader
     degrees: bool = True
     sequence: str = "xyz"
+    copies: dict[tuple[str | None, ...], list[Array]] = field(default_factory=dict)
+    """Positions of copies by their displacement."""
 
     @classmethod
-    def of(cls, reader: XmlReader) -> Compiler:
+    def of(cls, reader: XmlReader, root: xml.Element) -> Compiler:
         """Return the conventions of a document; the last one of each counts."""
         found = cls(reader)
-        for element in reader.root.findall("compiler"):
+        for element in root.findall("compiler"):
             unit, sequence = element.get("angle"), element.get("eulerseq", found.sequence)
             if unit not in (None, "degree", "radian"):
                 reader.defect(xml.get_line(element), "angle of <compiler>", unit, "degree or radian")
@@ -97,6 +97,17 @@ class Compiler:
     def pose(self, element: xml.Element) -> Array:
         """Return the pose (4, 4) of an element with ``pos`` and any form of orientation."""
         return build_pose(self.reader.numbers(element, "pos", (0, 0, 0)), self._orientation(element))
+
+    def frame(self, element: xml.Element) -> Array:
+        """Return the pose (4, 4) of a frame; that of a copy is turned as often, and displaced from the one before."""
+        if (number := element.get(COPY)) is None:
+            return self.pose(element)
+        offset, euler = (self.reader.numbers(element, key, (0, 0, 0)) for key in ("pos", "euler"))
+        angles = [self.angle(value) for value in euler]
+        before = self.copies.setdefault((element.get("pos"), element.get("euler")), [np.zeros(3)])
+        while len(before) <= int(number):
+            before.append(before[-1] + self._euler([(len(before) - 1) * angle for angle in angles]) @ offset)
+        return build_pose(before[int(number)], self._euler([int(number) * angle for angle in angles]))
 
     def _orientation(self, element: xml.Element) -> Array | None:
         reader = self.reader
@@ -135,42 +146,3 @@ def _find_least_rotation(z: Array) -> Array:
     if sine < 1e-12:
         return np.eye(3) if z[2] > 0 else rotate_about_axis((1, 0, 0), np.pi)
     return rotate_about_axis(axis, float(np.arctan2(sine, z[2])))
-
-
-def expand_includes(root: xml.Element, file: str) -> xml.Element:
-    """Return the document with every ``<include>`` replaced by the content of its file; only files in the folder of the
-    main one and below it are read, none twice. Raises ``BadRobotFile``."""
-    folder = Path(file).resolve().parent
-    read = {Path(file).resolve()}
-    size = 0
-    while (element := next(root.iter("include"), None)) is not None:
-        name = element.get("file") or ""
-
-        def refuse(what: str, allowed: str, at: xml.Element = element, value: str = name) -> BadRobotFile:
-            return xml.make_file_error(at.base or file, what, allowed, value=value, line=xml.get_line(at))
-
-        try:
-            path = (folder / name).resolve()
-        except (OSError, ValueError):
-            raise refuse("<include>: not a file", "a file in the model's folder") from None
-        if not name or not path.is_relative_to(folder):
-            raise refuse("<include>: outside of the model's folder", "a file in the model's folder")
-        if path in read or len(read) > INCLUDED_FILES_MAX:
-            raise refuse("<include>: repeated file, or too many files", f"each once, up to {INCLUDED_FILES_MAX}")
-        read.add(path)
-        try:
-            content = xml.read_bytes(path)
-        except BadRobotFile as error:
-            raise refuse(f"<include>: {error.defects[0].problem}", "a file in the model's folder") from None
-        size += len(content)
-        if size > ROBOT_FILE_MAX_BYTES:
-            raise refuse("<include>: files too large", f"up to {ROBOT_FILE_MAX_BYTES} bytes together")
-        parent, included = element.getparent(), xml.parse_document(content, str(path))
-        if parent is None:
-            raise refuse("<include> in place of the model", "<mujoco>")
-        place = parent.index(element)
-        parent.remove(element)
-        for child in reversed(xml.list_children(included)):
-            child.base = str(path)
-            parent.insert(place, child)
-    return root

@@ -23,6 +23,10 @@ _ACTUATOR = (
 _INSIDE = (
     "body* joint* freejoint* geom* site* camera* light* attach* composite* flexcomp* plugin* frame* replicate* include*"
 )
+_TENDON = (
+    "actuatorfrclimited actuatorfrcrange armature damping frictionloss group limited margin material range rgba "
+    "solimpfriction solimplimit solreffriction solreflimit springlength springyield stiffness user width"
+)
 NAMES = Vocabulary(
     f"""
 mujoco: model | compiler* option* size* statistic* visual* default* asset* worldbody* contact* deformable* equality*
@@ -35,6 +39,9 @@ default: class | default* mesh* texture material* joint* geom* site* camera ligh
 worldbody: | {_INSIDE}
 body: {_ORIENTATION} childclass fuse gravcomp mocap name pos simple sleep user | inertial {_INSIDE}
 frame: {_ORIENTATION} childclass name pos | inertial {_INSIDE}
+replicate: count euler offset sep | {_INSIDE}
+attach: body frame model prefix
+model: content_type file name
 inertial: {_ORIENTATION} pos mass diaginertia fullinertia
 joint: {_JOINT}
 freejoint: align group name
@@ -52,6 +59,11 @@ default/equality: active solimp solref
 connect: {_EQUALITY} anchor body1 body2 site1 site2
 weld: {_EQUALITY} anchor body1 body2 relpose site1 site2 torquescale
 equality/joint: {_EQUALITY} joint1 joint2 polycoef
+equality/tendon: {_EQUALITY} tendon1 tendon2 polycoef
+tendon: | spatial* fixed* include*
+tendon/fixed: {_TENDON} class name | joint*
+default/tendon: {_TENDON}
+fixed/joint: joint coef
 actuator: | {_ACTUATORS.replace(" ", "* ")}* plugin* include*
 {" ".join(f"{parent}/{each}" for parent in ("actuator", "default") for each in _ACTUATORS.split())}: {_ACTUATOR}
 keyframe: | key* include*

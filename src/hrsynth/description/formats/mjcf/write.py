@@ -9,7 +9,7 @@ from lxml import etree
 
 from ....geometry.so3 import convert_to_quaternions
 from ....geometry.vectors import Array, invert_pose
-from ....mechanism.model import Joint, JointType, Mechanism, Note
+from ....mechanism.model import Joint, JointType, Mechanism, Note, make_fresh_name
 from ... import numerals, xml
 from ...annotations import PREFIX, list_annotations
 from ...chains import SECOND
@@ -24,6 +24,8 @@ _TREE = (JointType.REVOLUTE, JointType.PRISMATIC, JointType.SPHERICAL, JointType
 _LOOPS = (JointType.SPHERICAL, JointType.FIXED, JointType.REVOLUTE)
 _NAMES = {JointType.REVOLUTE: "hinge", JointType.PRISMATIC: "slide", JointType.SPHERICAL: "ball"}
 WORLD = "world"
+BODY_MASS_MIN = 0.001
+"""Mass (kg) that a written file makes MuJoCo give to bodies with less: it refuses moving bodies without mass."""
 
 
 def write(mechanism: Mechanism) -> Written:
@@ -44,28 +46,34 @@ def write(mechanism: Mechanism) -> Written:
     loops = [
         element for joint in robot.joints.values() if not joint.in_tree for element in _build_closure(robot, joint)
     ]
-    motors = [
-        xml.create_element("motor", name=joint.motor.name, joint=joint.name)
-        for joint in robot.joints.values()
-        if joint.motor is not None and joint.type is not JointType.FIXED
-    ]
+    motors = dict[str, xml.Element]()
+    for joint in robot.joints.values():
+        if joint.motor is not None and joint.type is not JointType.FIXED:
+            name = make_fresh_name(joint.motor.name, motors)  # a transmission may drive several joints
+            motors[name] = xml.create_element("motor", name=name, joint=joint.name)
     inner, assets, odd = build_elements(robot)
     sections = {
         "custom": custom,
         "asset": assets,
         "worldbody": _build_bodies(robot, inner),
         "equality": [*loops, *_build_couplings(robot)],
-        "actuator": motors,
+        "actuator": [*motors.values()],
     }
     root = xml.create_element(
         "mujoco",
-        xml.create_element("compiler", angle="radian", boundmass="0.001", boundinertia="0.000001"),
+        xml.create_element("compiler", angle="radian", boundmass=str(BODY_MASS_MIN), boundinertia="0.000001"),
         *(xml.create_element(tag, *elements) for tag, elements in sections.items() if elements),
         model=robot.name,
     )
     return Written(
         (xml.format_document(root),),
-        (*lost, *_list_losses(robot), *odd, *list_unsupported_content(robot, SIZES, dialect="MJCF")),
+        (
+            *lost,
+            *_list_losses(robot),
+            *_list_light_links(inner),
+            *odd,
+            *list_unsupported_content(robot, SIZES, dialect="MJCF"),
+        ),
     )
 
 
@@ -92,6 +100,25 @@ def _list_losses(robot: Mechanism) -> list[Note]:
     if fixed:
         found.append(Note("warning", "the names of fixed joints are not written: " + join_names(fixed)))
     return found
+
+
+def _list_light_links(inner: Mapping[str, list[xml.Element]]) -> list[Note]:
+    """Return the note of the mass that MuJoCo adds to links without mass and shapes, if others have a mass."""
+    masses = {
+        link: [float(part.get("mass", 0.0)) for part in elements if part.tag == "inertial"]
+        for link, elements in inner.items()
+        if link != WORLD
+    }
+    light = [
+        link
+        for link, values in masses.items()
+        if sum(values) < BODY_MASS_MIN and (values or not any(part.tag == "geom" for part in inner[link]))
+    ]
+    if not light or not any(masses.values()):
+        return []
+    added = sum(BODY_MASS_MIN - sum(masses[link]) for link in light)
+    text = f"{len(light)} links get the least mass of {BODY_MASS_MIN} kg (boundmass), {added:.3g} kg are added"
+    return [Note("warning", f"{text}: {join_names(light)}")]
 
 
 def _build_bodies(robot: Mechanism, inner: Mapping[str, list[xml.Element]]) -> list[xml.Element]:
@@ -163,13 +190,12 @@ def _build_closure(robot: Mechanism, joint: Joint) -> list[xml.Element]:
 
 
 def _build_couplings(robot: Mechanism) -> list[xml.Element]:
-    carrier = {joint.successor: joint.name for joint in robot.joints.values() if joint.in_tree}
     return [
         xml.create_element(
             "joint",
             name=each.name,
-            joint1=carrier[each.successor],
-            joint2=carrier[each.predecessor],
+            joint1=each.driven,
+            joint2=each.driver,
             polycoef=numerals.format_exact_vector((0, each.ratio, 0, 0, 0)),
         )
         for each in robot.couplings

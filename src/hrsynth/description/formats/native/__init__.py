@@ -13,4 +13,4 @@ def _is_native_file(file: RobotFile) -> bool:
     return file.tag == "robot" and file.strict and file.has_child("hrsynth")
 
 
-DIALECT = FileFormat("native", _is_native_file, (".urdf",), rank=1)
+DIALECT = FileFormat("native", _is_native_file, (".urdf",), rank=1, reread=False)

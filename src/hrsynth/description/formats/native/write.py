@@ -8,19 +8,22 @@ from collections.abc import Sequence
 import numpy as np
 from lxml import etree
 
-from ....budgets import FILE_NUMBER_MAX
 from ....errors import BadRequest
 from ....geometry.vectors import Array, build_pose, invert_pose, normalise_vector
 from ....mechanism.model import Joint, JointType, Limits, Mechanism, Motor
 from ....mechanism.screws import split_elementary
-from ....tolerances import DIRECTION_SINE_TOL, ORIGIN_DISTANCE_TOL
+from ....tolerances import DIRECTION_SINE_TOL
 from ... import chains, numerals, xml
 from ...annotations import IMAGE, list_camera_attributes
 from ...file_format import Written
 from ...jointgraph import LOOP_TYPES, ORIGIN
+from ...numerals import FILE_NUMBER_MAX
 from ...observation_text import list_observe_attributes
 from ...tree import build_spanning_mechanism, list_outward_joints
 from ..urdf.elements import build_transmission
+
+ORIGIN_DISTANCE_TOL = 1e-12
+"""Distance (m) below which a joint's centre is the origin of the link that it carries, where a file is written."""
 
 _LOOP_NAMES = {kind: name for name, kind in LOOP_TYPES.items() if name != "continuous"}
 _OWN = re.compile(r"<hrsynth[\s/>]")
@@ -75,15 +78,15 @@ class _NativeWriter:
             for joint in order:
                 root.extend(written[joint.name])
             for each in robot.couplings:
-                ends = (
-                    xml.create_element("predecessor", link=each.predecessor),
-                    xml.create_element("successor", link=each.successor),
-                )
+                carried = (robot.joints[name].successor for name in (each.driver, each.driven))
+                tags = zip(("predecessor", "successor"), carried, strict=True)
+                ends = (xml.create_element(tag, link=link) for tag, link in tags)
                 ratio = xml.create_element("ratio", value=numerals.format_exact(each.ratio))
                 root.append(xml.create_element("coupling", *ends, ratio, name=each.name))
             self._transmissions(root, order)
             inner = [fragment for fragment in robot.xml if _OWN.match(fragment)]
             xml.restore(root, [fragment for fragment in robot.xml if fragment not in inner])
+            _remove_passive_commands(root)
             if len(own := self._own(inner)) or not self.mechanism.has_open_platform:
                 root.append(own)
         except ValueError as error:  # lxml: characters that no XML document can hold
@@ -194,6 +197,14 @@ class _NativeWriter:
                 element.set(name, value)
             element.extend(list(whole))
         return element
+
+
+def _remove_passive_commands(root: xml.Element) -> None:
+    """Remove the command interfaces of joints without a motor from ``<ros2_control>``: they would be read as motors."""
+    driven = {joint.get("name") for joint in root.findall("transmission/joint")}
+    for element in root.findall("ros2_control/joint"):
+        for command in element.findall("command_interface") if element.get("name") not in driven else ():
+            element.remove(command)
 
 
 def _compute_local_axes(joint: Joint, X_J: Array) -> list[Array]:

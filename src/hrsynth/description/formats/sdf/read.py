@@ -6,8 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ....budgets import NESTED_MODELS_MAX
-from ....errors import BadRobotFile
+from ....errors import BadRequest, BadRobotFile
 from ....geometry.vectors import Array, freeze_array, invert_pose
 from ....mechanism.model import Link
 from ....tolerances import GEOMETRY_DIFFERENCE_TOL
@@ -20,8 +19,12 @@ from ...keyframes import read_joint_value
 from ..extensions import read_drake, read_plugins
 from ..paired import join_named_pairs, join_onshape_pairs
 from .content import read_content
+from .includes import include_models
 from .joint import JointFrames, add, infer_motors, name_gears, read_couplings, read_numbers, read_pose, read_text
 from .names import NAMES
+
+NESTED_MODELS_MAX = 20
+"""Models in models above which an SDFormat file is refused."""
 
 MODEL, WORLD = "__model__", "world"
 VERSIONS = "1.4 to 1.12"
@@ -30,9 +33,10 @@ VERSIONS = "1.4 to 1.12"
 def read(file: RobotFile) -> JointGraph:
     """Return the joint graph of an SDFormat document. Raises ``BadRobotFile`` with all its defects."""
     root = file.document
+    missing = include_models(root, str(file.path))
     defects, notes = NAMES.check(root, file)
-    graph = _SdfReader(str(file.path), root, defects).graph()
-    graph.notes[:0] = notes
+    graph = _SdfReader(str(file.path), root, defects=defects, wanted=file.model).graph()
+    graph.notes[:0] = [*missing, *notes]
     return graph
 
 
@@ -55,12 +59,16 @@ class _SdfReader(XmlReader):
     joints: list[tuple[str, xml.Element]] = field(default_factory=list)
     poses: dict[str, Array] = field(default_factory=dict)
     carried: set[str] = field(default_factory=set)
+    wanted: str | None = None
+    """Name of the model to read."""
 
     def graph(self) -> JointGraph:
         """Return the joint graph of the document's model."""
         self.version = self._version()
-        model = self._model()
+        model, others = self._model()
         graph = self.result = JointGraph(model.get("name") or "robot", self.file, "SDF", digits=self.digits)
+        if others:
+            graph.note("ignored", f"{len(others)} other models in the file: {join_names(others)}")
         self.frames[MODEL] = _FrameElement(model.find("pose"), WORLD, WORLD, "model")
         self._collect(model, "", 0)
         self.require_some(graph.links, "links", model)
@@ -102,7 +110,9 @@ class _SdfReader(XmlReader):
                 self.result.postures[state.get("world_name") or state.get("name") or "state"] = found
 
     def _closures(self, model: xml.Element) -> None:
-        """Add the closures of other tools' extensions."""
+        """Add the frames, and the closures of other tools' extensions."""
+        found = {name: self._frame_spec(name) for name, frame in self.frames.items() if frame.kind == "frame"}
+        self.result.frames = {name: frame for name, frame in found.items() if frame is not None}
         read_drake(self, self.result, model, self._frame_spec)
         plugins = [*model.findall("plugin"), *self.root.findall("world/plugin")]
         if plugins:
@@ -110,10 +120,8 @@ class _SdfReader(XmlReader):
             others = [name for each in self.root.iter("model") if each is not model for name in [each.get("name")]]
             read_plugins(self.result, plugins, poses, tuple(map(str, others)))
         if all(joint.in_tree for joint in self.result.joints.values()):
-            found = {name: self._frame_spec(name) for name, frame in self.frames.items() if frame.kind == "frame"}
-            frames = {name: frame for name, frame in found.items() if frame is not None}
-            join_onshape_pairs(self, self.result, frames)
-            join_named_pairs(self.result, frames)
+            join_onshape_pairs(self, self.result, self.result.frames)
+            join_named_pairs(self.result, self.result.frames)
 
     def _frame_spec(self, name: str) -> FrameSpec | None:
         """Return the link that a link or frame of that name is fixed to, and its pose; None for an unknown name."""
@@ -137,13 +145,25 @@ class _SdfReader(XmlReader):
             raise BadRobotFile(self.defects)
         return int(parts[0]), int(parts[1])
 
-    def _model(self) -> xml.Element:
+    def _model(self) -> tuple[xml.Element, list[str]]:
+        """Return the named model, else the only one with joints, and the names of the others."""
         models = [*self.root.findall("model"), *self.root.findall("world/model")]
         jointed = [model for model in models if model.find(".//joint") is not None] or models
+        names = [model.get("name", "") for model in models]
+        if self.wanted is not None:
+            jointed = [model for model in models if model.get("name") == self.wanted]
+        if self.wanted is not None and not jointed:
+            raise BadRequest("--model: no such model", self.wanted, join_names(names, like=self.wanted))
         if len(jointed) != 1:
-            self.defect(xml.get_line(self.root), "number of models with joints", str(len(jointed)), "1")
+            given = join_names(model.get("name", "") for model in jointed)
+            self.defect(
+                xml.get_line(self.root),
+                "several models with joints" if jointed else "no model",
+                given or None,
+                "one (--model NAME)" if jointed else "a <model>",
+            )
             raise BadRobotFile(self.defects)
-        return jointed[0]
+        return jointed[0], [name for name, model in zip(names, models, strict=True) if model is not jointed[0]]
 
     def _collect(self, model: xml.Element, prefix: str, depth: int) -> None:
         """Collect the frames of a model and of those in it; ``prefix`` begins the names in it."""
@@ -151,10 +171,6 @@ class _SdfReader(XmlReader):
             self.defect(xml.get_line(model), "models nested too deeply", None, f"{NESTED_MODELS_MAX} levels")
             return
         for element in xml.list_children(model):
-            if element.tag == "include":
-                self.defect(
-                    xml.get_line(element), "an <include>: other files are not fetched", read_text(element, "uri")
-                )
             if element.tag not in ("link", "frame", "joint", "model"):
                 continue
             bare = self.attribute(element, "name")

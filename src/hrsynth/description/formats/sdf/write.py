@@ -35,7 +35,7 @@ def write(mechanism: Mechanism) -> Written:
     robot, lost = reduce(mechanism, tuple(_NAMES), tuple(_NAMES), tuple(_NAMES), BODY)
     require_free_world(robot, WORLD, "SDFormat")
     lost = (*lost, *_warn_names(robot))
-    gears = {gear.successor: gear for gear in robot.couplings}
+    gears = {gear.driven: gear for gear in robot.couplings}
     if len(gears) < len(robot.couplings):
         more = join_names(gear.name for gear in robot.couplings if gear not in gears.values())
         lost = (*lost, Note("warning", f"a joint of SDFormat follows one other joint; not written: {more}"))
@@ -50,10 +50,9 @@ def write(mechanism: Mechanism) -> Written:
         weld = etree.SubElement(model, "joint", name=robot.fresh("to_world"), type="fixed")
         etree.SubElement(weld, "parent").text = WORLD
         etree.SubElement(weld, "child").text = robot.base
-    carrier = {joint.successor: joint.name for joint in robot.joints.values() if joint.in_tree}
     for joint in sorted(robot.joints.values(), key=lambda each: not each.in_tree):
-        gear = gears.get(joint.successor) if joint.in_tree else None
-        _write_joint(model, robot, joint, None if gear is None else (carrier[gear.predecessor], gear.ratio))
+        gear = gears.get(joint.name)
+        _write_joint(model, robot, joint, None if gear is None else (gear.driver, gear.ratio))
     for key, text in list_annotations(robot, motors=True):
         etree.SubElement(model, f"{{{NAMESPACE}}}{key}").text = text
     return Written((xml.format_document(root),), (*lost, *list_unsupported_content(robot, SIZES, dialect="SDFormat")))

@@ -50,8 +50,15 @@ def read_gazebo_joints(reader: UrdfReader, graph: JointGraph) -> None:
     if not found and not plugins:
         return
     poses = _compute_zero_poses(graph)
+    added = {link.get("name") for element in reader.root.findall("gazebo") for link in element.findall("link")}
     for element in found:
         parent, child = (sdf.read_text(element, tag) for tag in ("parent", "child"))
+        if more := {parent, child} & added:
+            what = "joint of <gazebo> to a link that <gazebo> adds, which is not supported"
+            reader.defect(
+                xml.get_line(element), what, more.pop(), "a link of the robot: declare it there, with a joint"
+            )
+            return
         if parent is None or child is None or parent == child:
             reader.defect(xml.get_line(element), "joint of <gazebo> without two links", element.get("name"))
             continue
@@ -82,11 +89,17 @@ CONSTRAINTS = {**LOOP_TYPES, "ball": JointType.SPHERICAL, "weld": JointType.FIXE
 _SIDES = ("parent", "child")
 
 
+def _get_constraint_type(element: xml.Element, default: str = "") -> JointType | None:
+    """Return the type of a closure, with or without the suffix ``_joint`` or ``_constraint``; None if unknown."""
+    bare = element.get("type", default).strip().lower().removesuffix("_constraint").removesuffix("_joint")
+    return CONSTRAINTS.get(bare)
+
+
 def read_constraint(reader: UrdfReader, graph: JointGraph) -> None:
     """Add the closure of ``<constraint name type>`` as proposed for urdfdom: parent and child, each with its own origin
     and axis."""
     for element in reader.root.findall("constraint"):
-        name, kind = reader.attribute(element, "name"), CONSTRAINTS.get(element.get("type", ""))
+        name, kind = reader.attribute(element, "name"), _get_constraint_type(element)
         if kind is None:
             reader.defect(xml.get_line(element), "unknown constraint type", element.get("type"), ", ".join(CONSTRAINTS))
             continue
@@ -124,7 +137,7 @@ def read_loop_joint(reader: UrdfReader, graph: JointGraph) -> None:
     files write two ``<link1>``), of exporters for Fusion with ``<parent>`` and ``<child>`` like a ``<constraint>``."""
     for element in reader.root.findall("loop_joint"):
         name = reader.attribute(element, "name")
-        kind = CONSTRAINTS.get(element.get("type", "spherical"))
+        kind = _get_constraint_type(element, "spherical")
         if kind is None or kind.axes > 1:
             reader.defect(
                 xml.get_line(element),
@@ -166,12 +179,16 @@ def _read_fusion_ends(reader: UrdfReader, graph: JointGraph, element: xml.Elemen
 
 def read_drake_elements(reader: UrdfReader, graph: JointGraph) -> None:
     """Add Drake's ball constraints and bushings between links and ``<frame>`` elements."""
-    frames = {name: FrameSpec(name) for name in graph.links}
     for element in reader.root.findall("frame"):
         name, link = element.get("name"), element.get("link")
         if name is not None and link in graph.links:
-            frames[name] = FrameSpec(link, freeze_array(reader.pose(element)), xml.get_line(element))
-    read_drake(reader, graph, reader.root, frames.get)
+            graph.frames[name] = FrameSpec(link, freeze_array(reader.pose(element)), xml.get_line(element))
+    read_drake(
+        reader,
+        graph,
+        reader.root,
+        lambda name: graph.frames.get(name) or (FrameSpec(name) if name in graph.links else None),
+    )
 
 
 def join_named_frames(reader: UrdfReader, graph: JointGraph) -> None:

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from lxml import etree
 
 from ....errors import BadRequest
 from ....geometry.vectors import Array
 from ....mechanism.cameras import NamedCamera
-from ....mechanism.model import Coupling, JointType, Limits, Link, Motor
+from ....mechanism.model import JointType, Limits, Link, Motor
+from ....mechanism.observations.direction import Direction
 from ....mechanism.screws import split_elementary
 from ... import xml
-from ...elements import XmlReader
-from ...jointgraph import LOOP_TYPES, ORIGIN, FrameSpec, JointSpec
+from ...elements import TURNS, XmlReader
+from ...jointgraph import LOOP_TYPES, ORIGIN, CouplingSpec, FrameSpec, JointGraph, JointSpec
 from ...observation_text import ObservationSpec, parse_observe_attributes
 
 TREE_TYPES = {
@@ -31,6 +32,12 @@ _PLANAR = ("__x", "__y", "__turn")
 """Suffixes of the names of the three joints of a planar one."""
 
 
+OWN_TAGS = ("platform", "camera", "observe")
+"""Elements that an ``<hrsynth>`` is read for; other children are kept unless they resemble these."""
+ELSEWHERE = ("link", "joint", "loop", "coupling", "transmission")
+"""Elements that belong directly into ``<robot>``."""
+
+
 @dataclass
 class UrdfReader(XmlReader):
     """Reader of the joint graph of a URDF document."""
@@ -39,7 +46,7 @@ class UrdfReader(XmlReader):
     tree: dict[str, JointSpec] = field(default_factory=dict)
     loops: dict[str, JointSpec] = field(default_factory=dict)
     motors: dict[str, Motor] = field(default_factory=dict)
-    couplings: list[Coupling] = field(default_factory=list)
+    couplings: list[CouplingSpec] = field(default_factory=list)
 
     @property
     def joints(self) -> dict[str, JointSpec]:
@@ -58,6 +65,7 @@ class UrdfReader(XmlReader):
                 self.add(element, LOOP_TYPES, ends, ["predecessor", "successor"])
         for element in self.root.findall("transmission"):
             self.transmission(element)
+        self.commands()
         names: set[str] = set()
         for element in self.root.findall("coupling"):
             self.coupling(element, names)
@@ -147,6 +155,17 @@ class UrdfReader(XmlReader):
         """Read a ``<transmission>``: its joints are motors."""
         raise NotImplementedError
 
+    def commands(self) -> None:
+        """Read ``<ros2_control>``: joints with a command interface have motors, unless they follow another joint."""
+        joints = self.joints
+        followers = {joint.get("name") for joint in self.root.findall("joint") if joint.find("mimic") is not None}
+        for element in self.root.findall("ros2_control/joint"):
+            name = element.get("name", "")
+            commanded = element.find("command_interface") is not None
+            follows = name in followers or element.find("param[@name='mimic']") is not None
+            if commanded and not follows and name in joints and joints[name].type is not JointType.FIXED:
+                self.motors.setdefault(name, Motor(f"motor_{name}"))
+
     def planar(self, joint: JointSpec) -> None:
         """Add the P, P, R and two links that URDF's planar joint is."""
         names = [joint.name + suffix for suffix in _PLANAR]
@@ -199,7 +218,29 @@ class UrdfReader(XmlReader):
                     "a number other than 0",
                 )
             if name and one.link and two.link:
-                self.couplings.append(Coupling(name, one.link, two.link, value, xml.get_line(element)))
+                self.couplings.append(CouplingSpec(name, one.link, two.link, value, line=xml.get_line(element)))
+
+    def graph_of(self, name: str, dialect: str, known: Sequence[str]) -> JointGraph:
+        """Return the graph of all links, joints and motors, with the elements that are not ``known``."""
+        graph = JointGraph(name, self.file, dialect, self.links, digits=self.digits)
+        graph.joints = {name: replace(joint, motor=self.motors.get(name)) for name, joint in self.joints.items()}
+        graph.rest = list(xml.list_unknown(self.root, ["name"], known))
+        return graph
+
+    def couple(self, graph: JointGraph) -> None:
+        """Add the couplings to the graph: they name links, which may be fixed to the links that joints carry."""
+        carrier = {joint.ends[1].link: joint for joint in self.tree.values()}
+        for coupling in self.couplings:
+            joints = []
+            for link in (coupling.driver, coupling.driven):
+                while (joint := carrier.get(link)) is not None and joint.type is JointType.FIXED:
+                    link = joint.links[0]
+                joints.append(None if joint is None else joint.name)
+            if None in joints:
+                self.defect(coupling.line, f"coupling {coupling.name!r}: a link that no joint carries")
+            else:
+                one, two = map(str, joints)
+                graph.gears.append(replace(coupling, driver=one, driven=two))
 
     def sights(self, own: xml.Element) -> tuple[list[ObservationSpec], list[NamedCamera]]:
         """Return the observations in ``<hrsynth>`` other than directions by its own camera, and the named cameras."""
@@ -228,6 +269,64 @@ class UrdfReader(XmlReader):
                     value = None if error.got is None else str(error.got)
                     self.defect(xml.get_line(element), error.problem, value, error.expected)
         return specs, cameras
+
+    def own(self, graph: JointGraph) -> None:
+        """Read the ``<hrsynth>`` element, if there is one: platform, camera, observations."""
+        element = self.only(self.root, "hrsynth")
+        if element is None:
+            return
+        graph.sights, graph.cameras = self.sights(element)
+        for role in ("platform", "camera"):
+            found = [each for each in element.findall(role) if role == "platform" or each.get("name") is None]
+            for extra in found[1:]:
+                self.defect(
+                    xml.get_line(extra), f"second <{role}> in <hrsynth>" + " without a name" * (role == "camera")
+                )
+            if found:
+                child = found[0]
+                link = self.attribute(child, "link")
+                if self.is_known_link(link, xml.get_line(child), f"{role}: unknown link"):
+                    setattr(graph, role, link)
+                if role == "platform":
+                    if (text := child.get("turns", "true")) not in TURNS:
+                        self.defect(xml.get_line(child), "turns of <platform>", text, "true, false")
+                    graph.turns = TURNS.get(child.get("turns", ""))
+        graph.formation = graph.platform is None and bool(graph.sights)
+        for observe in element.findall("observe"):
+            if not is_sight(observe):
+                self.observe(graph, observe)
+        for child in xml.list_children(element):
+            if child.tag not in OWN_TAGS and (
+                child.tag in ELSEWHERE or difflib.get_close_matches(child.tag, OWN_TAGS, n=1, cutoff=0.75)
+            ):
+                self.defect(
+                    xml.get_line(child),
+                    "unknown element in <hrsynth>",
+                    f"<{child.tag}>",
+                    ", ".join(f"<{tag}>" for tag in OWN_TAGS),
+                )
+        rest = xml.list_unknown(element, ["serial"], OWN_TAGS)
+        if rest:
+            bare = etree.Element("hrsynth")
+            xml.restore(bare, rest)
+            graph.rest.append(xml.format_canonical(bare))
+
+    def observe(self, graph: JointGraph, element: xml.Element) -> None:
+        """Read an ``<observe>`` of a direction."""
+        leg, link = self.attribute(element, "leg"), self.attribute(element, "link")
+        self.is_known_link(link, xml.get_line(element), "observe: unknown link")
+        if leg is not None and (leg == "all" or "," in leg):
+            self.defect(
+                xml.get_line(element),
+                "observe: label not usable in a list",
+                leg,
+                "a label without commas, other than all",
+            )
+        if self.attribute(element, "axis") is None:
+            return
+        direction = self.direction(element, "axis", (0, 0, 1))
+        if leg is not None and link is not None:
+            graph.observations.append(Direction(leg, link, direction, line=xml.get_line(element)))
 
     def check_ends(self, loop: str = "loop") -> None:
         """Record a defect for every end on an unknown link and every joint from a link to itself; loops are called

@@ -5,30 +5,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from ....mechanism.model import JointType, Limits, Link, Motor
-from ....mechanism.observations.direction import Direction
 from ... import xml
-from ...elements import TURNS, read_sound_limits
+from ...elements import read_sound_limits
 from ...file_format import RobotFile
 from ...jointgraph import CouplingSpec, JointGraph, join_names
 from ..extensions import DRAKE, is_drake, strip_namespace
 from .conventions import CONVENTIONS
-from .elements import TREE_TYPES, UrdfReader, is_sight
+from .elements import ELSEWHERE, TREE_TYPES, UrdfReader
 from .names import NAMES
 
 WORLD = "world"
 TYPES = {**TREE_TYPES, "spherical": JointType.SPHERICAL, "ball": JointType.SPHERICAL}
-_KNOWN = (
-    "link",
-    "joint",
-    "loop",
-    "coupling",
-    "transmission",
-    "hrsynth",
-    *(convention.tag for convention in CONVENTIONS if convention.tag is not None),
-)
+_KNOWN = (*ELSEWHERE, "hrsynth", *(convention.tag for convention in CONVENTIONS if convention.tag is not None))
 
 
 def read(file: RobotFile, *, frames: bool = True) -> JointGraph:
@@ -38,7 +27,7 @@ def read(file: RobotFile, *, frames: bool = True) -> JointGraph:
     """
     root = file.document
     defects, notes = NAMES.check(root, file)
-    graph = _TolerantReader(str(file.path), root, defects).graph(frames and root.find("hrsynth") is None)
+    graph = _TolerantReader(str(file.path), root, defects=defects).graph(frames and root.find("hrsynth") is None)
     graph.notes[:0] = notes
     return graph
 
@@ -53,15 +42,14 @@ class _TolerantReader(UrdfReader):
         """Return all links, joints and closures."""
         self.elements()
         self.check_structure()
-        graph = JointGraph(self.root.get("name") or "robot", self.file, "URDF", self.links, digits=self.digits)
-        for kind, text in self.notes:
-            graph.note(kind, text)
-        graph.joints = {name: replace(joint, motor=self.motors.get(name)) for name, joint in self.joints.items()}
         closing = [
             str(each.tag) for each in xml.list_children(self.root) if is_drake(each) and strip_namespace(each) in DRAKE
         ]
-        graph.rest = list(xml.list_unknown(self.root, ["name"], [*_KNOWN, *closing]))
-        self.add_gears(graph)
+        graph = self.graph_of(self.root.get("name") or "robot", "URDF", [*_KNOWN, *closing])
+        for kind, text in self.notes:
+            graph.note(kind, text)
+        self.couple(graph)
+        graph.follow(self.mimics)
         for convention in CONVENTIONS:
             if convention.tag is not None or frames:
                 convention.read(self, graph)
@@ -117,42 +105,3 @@ class _TolerantReader(UrdfReader):
             names = join_names(joint.name for joint in ring)
             self.defect(ring[0].line, "joints that form a cycle", names, "a tree with one root")
         self.require_sound()
-
-    def add_gears(self, graph: JointGraph) -> None:
-        """Add couplings: ``<coupling>`` names links, which may be fixed to the links that joints carry; ``<mimic>``
-        names joints."""
-        carrier = {joint.links[1]: joint for joint in graph.joints.values() if joint.in_tree}
-
-        def carrying(link: str) -> str | None:
-            while (joint := carrier.get(link)) is not None and joint.type is JointType.FIXED:
-                link = joint.links[0]
-            return None if joint is None else joint.name
-
-        for coupling in self.couplings:
-            ends = [carrying(link) for link in (coupling.predecessor, coupling.successor)]
-            if None in ends:
-                self.defect(coupling.line, f"coupling {coupling.name!r}: a link that no joint carries")
-            else:
-                graph.gears.append(
-                    CouplingSpec(coupling.name, str(ends[0]), str(ends[1]), coupling.ratio, 0.0, coupling.line)
-                )
-        graph.follow(self.mimics)
-
-    def own(self, graph: JointGraph) -> None:
-        """Read platform, camera and observations from an ``<hrsynth>`` element, if there is one."""
-        for own in self.root.findall("hrsynth")[:1]:
-            for tag in ("platform", "camera"):
-                element = next((each for each in own.findall(tag) if each.get("name") is None), None)
-                link = None if element is None else element.get("link")
-                if element is not None and self.is_known_link(link, xml.get_line(element), f"{tag}: unknown link"):
-                    setattr(graph, tag, link)
-                    graph.turns = TURNS.get(element.get("turns", ""), graph.turns)
-            graph.sights, graph.cameras = self.sights(own)
-            graph.formation = graph.platform is None and bool(graph.sights)
-            for element in own.findall("observe"):
-                if is_sight(element):
-                    continue
-                link, leg = element.get("link"), element.get("leg")
-                if self.is_known_link(link, xml.get_line(element), "observe: unknown link") and leg and link:
-                    axis = self.direction(element, "axis", (0, 0, 1))
-                    graph.observations.append(Direction(leg, link, np.asarray(axis), line=xml.get_line(element)))

@@ -5,11 +5,18 @@ from __future__ import annotations
 import importlib.util
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
-from ....budgets import ROBOT_FILE_MAX_BYTES, XACRO_TIMEOUT_S, XML_ELEMENTS_MAX
-from ....errors import MissingExtra
+from ....errors import BadRequest, MissingExtra
+from ....mechanism.model import Note
+from ....tolerances import ROBOT_FILE_MAX_BYTES
 from ... import xml
+from ...jointgraph import join_names
+from ...xml import XML_ELEMENTS_MAX
+
+XACRO_TIMEOUT_S = 4
+"""Seconds after which expanding a xacro file is given up."""
 
 
 def is_needed(root: xml.Element) -> bool:
@@ -24,8 +31,12 @@ def is_needed(root: xml.Element) -> bool:
     )
 
 
-def expand(path: Path) -> xml.Element:
-    """Return the expanded document of a xacro file. Raises ``BadRobotFile``, ``MissingExtra``."""
+def expand(
+    path: Path, given: Sequence[str] = (), notes: list[Note] | None = None
+) -> tuple[xml.Element, dict[str, str]]:
+    """Return the expanded document of a xacro file with the ``given`` arguments ``name:=value``, and the arguments that
+    it declares with their values; add ``notes`` on assumed packages. Raises ``BadRobotFile``, ``MissingExtra``, and
+    ``BadRequest`` for an argument that the file does not declare."""
     import subprocess
 
     if importlib.util.find_spec("xacro") is None:
@@ -38,6 +49,7 @@ def expand(path: Path) -> xml.Element:
         str(path.resolve()),
         str(ROBOT_FILE_MAX_BYTES),
         str(XML_ELEMENTS_MAX),
+        *given,
     ]
     try:
         run = subprocess.run(command, capture_output=True, text=True, timeout=XACRO_TIMEOUT_S, check=False)
@@ -50,13 +62,24 @@ def expand(path: Path) -> xml.Element:
         raise xml.make_file_error(
             path if file is None else xml.shorten_path(path, file),
             f"xacro refuses it: {said[:300]}",
-            "a file that xacro expands",
+            None if ", expected " in said else "a file that xacro expands",
             line=line,
         )
-    places, _, text = run.stdout.partition("\n")
-    root = xml.parse_document(text, str(path))
-    xml.give_places(root, path, json.loads(places))
-    return root
+    first, _, text = run.stdout.partition("\n")
+    root, head = xml.parse_document(text, str(path)), json.loads(first)
+    added = [] if notes is None else notes
+    for package, folder in head["assumed"].items():
+        added.append(
+            Note("assumption", f"the package {package!r}, which is not here, is read from the file's own {folder}")
+        )
+    xml.give_places(root, path, head["places"])
+    declared: dict[str, str] = head["arguments"]
+    for name in (text.partition(":=")[0] for text in given):
+        if name not in declared:
+            raise BadRequest(
+                f"--arg: {path} declares no such argument", name, join_names(declared, like=name) or "none"
+            )
+    return root, declared
 
 
 def _read_last_message(errors: str) -> tuple[str | None, int | None, str]:

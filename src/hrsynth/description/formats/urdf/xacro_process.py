@@ -5,8 +5,9 @@ Expressions are Python's in syntax only: a walker over the syntax tree computes 
 numbers, texts, truth values, None, and lists and dictionaries of these; functions can be called but are not values, and
 nothing has attributes. The package's own ``eval`` is removed.
 
-``$(find PACKAGE)`` is the folder, the file's own or one above it, that has the path behind it. Environment variables
-are empty.
+``$(find PACKAGE)`` is a package of that name: a folder above the file, up to the one with a manifest, or one beside
+that, or one that is installed (:func:`list_installed_packages`). For a file without a manifest above it, a copy, its
+files may lie beside the file: an assumption. No other file is read. Environment variables are empty.
 """
 
 from __future__ import annotations
@@ -17,19 +18,27 @@ import math
 import operator
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any, TypeAlias
 from xml.dom import expatbuilder, minidom
+from xml.parsers.expat import ExpatError
 
 LIMITS = {"AS": 900_000_000, "CPU": 4, "FSIZE": 0, "NOFILE": 64, "CORE": 0, "NPROC": 0}
 """Limits of the process by the names of ``resource``: bytes, seconds, numbers. That of processes (NPROC) does not hold
 for root."""
 PACKAGE_FOLDER_LEVELS_MAX = 4
-"""Number of folders above the file that are searched for a package's files."""
+"""Number of folders above the file that are searched for its package's manifest."""
+PACKAGES_BESIDE_MAX = 1000
+"""Number of folders beside the file's package that are searched for another package."""
+MANIFEST_BYTES_MAX = 100_000
+"""Bytes of a package's manifest that are read for its name."""
+MANIFESTS = ("package.xml", "model.config")
 XACRO_POWER_BITS_MAX = 10_000
 """Largest number of bits of a power of integers."""
-MARK = "/find:package"
+MARK = "/find:"
+"""Start of a path in a package: the package's name and the path in it follow."""
 
 VALUES = (bool, int, float, str, list, tuple, dict, type(None))
 OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
@@ -180,11 +189,13 @@ class Expression:
         return holder[node.attr]
 
     def value_of_Call(self, node: ast.Call) -> Any:
+        name, first = ast.unparse(node.func), "".join(map(ast.unparse, node.args[:1]))
+        if name in ("map", "python.map") and first in self.functions:
+            return list(map(self.functions[first], *map(self.value, node.args[1:])))
         arguments = [self.value(part) for part in node.args]
         if any(part.arg is None for part in node.keywords):
             raise ValueError("** is not allowed in an expression")
         options = {str(part.arg): self.value(part.value) for part in node.keywords}
-        name = ast.unparse(node.func)
         if name in self.functions:
             return self.functions[name](*arguments, **options)
         if isinstance(node.func, ast.Attribute) and node.func.attr in TEXT_METHODS:
@@ -198,16 +209,28 @@ class Expression:
         )
 
 
-def restrict(xacro: Any, substitution: Any, folder: Path) -> None:
-    """Make the package evaluate its expressions here, and read files of the folder, or of its package, only."""
+def restrict(xacro: Any, substitution: Any, folder: Path, assumed: dict[str, str]) -> None:
+    """Make the package evaluate its expressions here, and read files of the folder, or of its package, and of the
+    packages that it finds, only; record the ``assumed`` folders of packages."""
+    package = list_package_folders(folder)[-1]
+    homes, extend = [package if has_manifest(package) else folder], xacro.abs_filename_spec
 
     def locate(spec: str) -> str:
-        return locate_include(spec, folder)
+        if any(letter in spec for letter in "*?["):
+            raise ValueError(f"{spec} is a pattern of files")
+        if MARK not in spec:
+            return str(extend(spec))
+        name, _, rest = spec.rpartition(MARK)[2].partition("/")
+        home, path = locate_in_package(name, rest.lstrip("/"), folder, xacro.filestack)
+        homes.append(home)
+        if read_package_name(home) != name:
+            assumed[name] = f"{home.name}/"
+        return str(path)
 
     def read(name: str) -> Any:
         path = Path(name).resolve()
-        if not path.is_relative_to(list_package_folders(folder)[-1]):
-            raise ValueError(f"{name} lies outside of the file's package")
+        if not any(map(path.is_relative_to, homes)):
+            raise ValueError(f"{name} lies outside of the file's package and of those that it names with $(find …)")
         return open(path, encoding="utf-8")
 
     def fail(*texts: Any) -> None:
@@ -231,7 +254,7 @@ def restrict(xacro: Any, substitution: Any, folder: Path) -> None:
         names = {**CONSTANTS, "true": True, "false": False, **typed}
         own: Functions = {
             "arg": lambda name: typed[name],
-            "find": lambda package: MARK,
+            "find": lambda package: MARK + package,
             "dirname": lambda: substitution._eval_dirname(context.get("filename")),
         }
         return str(Expression(names, {**functions, **own}).evaluate(text))
@@ -245,29 +268,55 @@ def restrict(xacro: Any, substitution: Any, folder: Path) -> None:
         module.eval = module.exec = module.compile = forbidden
     xacro.open = read
     xacro.safe_eval, xacro._global_symbols, xacro.abs_filename_spec = evaluate, dict(CONSTANTS), locate
-    substitution._eval, substitution._eval_find = evaluate_argument, lambda package: MARK
+    substitution._eval, substitution._eval_find = evaluate_argument, lambda package: MARK + package
     substitution._eval_env, substitution._eval_optenv = lambda variable: "", lambda variable, default="": default
 
 
-def locate_include(spec: str, folder: Path) -> str:
-    """Return the file that an include names. Raises ``ValueError`` for a file outside of the folder (of the package),
-    and for a pattern of files."""
-    if any(letter in spec for letter in "*?["):
-        raise ValueError(f"{spec} is a pattern of files")
-    if MARK in spec:
-        rest = Path(spec.split(MARK)[-1].lstrip("/"))
-        if ".." in rest.parts:
-            raise ValueError(f"{rest} leaves the package")
-        for home in list_package_folders(folder):
-            for start in range(len(rest.parts)):
-                candidate = home.joinpath(*rest.parts[start:])
-                if candidate.is_file():
-                    return str(candidate)
-        raise ValueError(f"no folder above the file has {rest}")
-    path = Path(spec) if Path(spec).is_absolute() else folder / spec
-    if not path.resolve().is_relative_to(folder):
-        raise ValueError(f"{spec} lies outside of the file's folder")
-    return str(path)
+def locate_in_package(name: str, rest: str, folder: Path, opened: Sequence[str]) -> tuple[Path, Path]:
+    """Return the folder of a package, and a path in it: one above the file, up to that of its own package, or else one
+    beside that, or one that is installed. Its manifest names it, or it has that name. For a file without a manifest
+    above, the file's folder also counts, with the end of a path that is a file not ``opened``. Raises ``ValueError`` if
+    there is none."""
+    for package in chain(list_packages(folder), list_installed_packages(name)):
+        if read_package_name(package) == name:
+            return package, package / rest
+    package = list_package_folders(folder)[-1]
+    if not has_manifest(package):
+        parts = Path(rest).parts
+        for path in (folder.joinpath(*parts[k:]) for k in range(len(parts))):
+            if path.is_file() and str(path) not in opened:
+                return folder, path
+    raise ValueError(
+        f"no package {name!r}: got none above the file up to {package.name}/, nor beside that, nor in ROS_PACKAGE_PATH "
+        f"and AMENT_PREFIX_PATH, expected its folder there (named {name}, or by its package.xml)"
+    )
+
+
+def list_packages(folder: Path) -> Iterator[Path]:
+    """Yield the folders that may be packages, those with a manifest first: above the file, and beside the last of
+    these; in a shared folder only with a manifest."""
+    above = list_package_folders(folder)
+    yield from sorted(above, key=has_manifest, reverse=True)
+    most = above[-1].parent if has_manifest(above[-1]) else above[-1]
+    beside = sorted(Path(each) for each in islice(os.scandir(most), PACKAGES_BESIDE_MAX))
+    yield from filter(has_manifest, beside)
+    yield from () if is_shared(most) else beside
+
+
+def list_installed_packages(name: str) -> Iterator[Path]:
+    """Yield the folders of a package in ``AMENT_PREFIX_PATH``, in ``ROS_PACKAGE_PATH`` and in the repositories that
+    robot_descriptions has on this disk, at most two levels below these."""
+    if not name or set(name) & set("/\\*?[") or name in (".", ".."):
+        return
+    prefixes, roots = (
+        [Path(entry) for entry in os.environ.get(variable, "").split(os.pathsep) if entry]
+        for variable in ("AMENT_PREFIX_PATH", "ROS_PACKAGE_PATH")
+    )
+    cloned = os.environ.get("ROBOT_DESCRIPTIONS_CACHE") or Path.home() / ".cache" / "robot_descriptions"
+    folders = [prefix / "share" / name for prefix in prefixes]
+    for root in (*roots, *sorted(Path(cloned).glob("*"))):
+        folders += [root] if root.name == name else [root / name, *sorted(root.glob(f"*/{name}"))]
+    yield from filter(Path.is_dir, folders)
 
 
 def list_package_folders(folder: Path) -> list[Path]:
@@ -275,10 +324,29 @@ def list_package_folders(folder: Path) -> list[Path]:
     manifest; without one, the folder above, unless that is a root or a user's."""
     above = [folder, *folder.parents]
     for k, each in enumerate(above[: PACKAGE_FOLDER_LEVELS_MAX + 1]):
-        if any((each / name).is_file() for name in ("package.xml", "model.config")):
+        if has_manifest(each):
             return above[: k + 1]
-    shared = Path.home(), Path(os.environ.get("TMPDIR", "/tmp"))
-    return above[:2] if len(above) > 2 and above[1] not in shared else above[:1]
+    return above[:1] if is_shared(folder.parent) else above[:2]
+
+
+def has_manifest(folder: Path) -> bool:
+    """Return True for the folder of a package of ROS or a model of Gazebo."""
+    return any((folder / name).is_file() for name in MANIFESTS)
+
+
+def is_shared(folder: Path) -> bool:
+    """Return True for a root and for the folders of a user and of temporary files."""
+    return folder in (Path(folder.anchor), Path.home(), Path(os.environ.get("TMPDIR", "/tmp")))
+
+
+def read_package_name(folder: Path) -> str:
+    """Return the name in a package's manifest, else that of the folder."""
+    try:
+        with open(folder / MANIFESTS[0], "rb") as stream:
+            manifest: Any = PlacedBuilder(MANIFESTS[0]).parseString(stream.read(MANIFEST_BYTES_MAX))
+        return str(manifest.getElementsByTagName("name")[0].firstChild.data).strip()
+    except (OSError, ValueError, ExpatError, IndexError, AttributeError):
+        return folder.name
 
 
 class PlacedBuilder(expatbuilder.ExpatBuilderNS):
@@ -349,18 +417,34 @@ def limit() -> None:
             resource.setrlimit(getattr(resource, f"RLIMIT_{name}"), (amount, amount))
 
 
-def main(name: str, largest: str, most: str) -> None:
-    """Expand one file to at most so many characters and elements."""
+def list_declared(xacro: Any) -> list[str]:
+    """Return the list to which the package adds the names of the arguments that a file declares."""
+    declared: list[str] = []
+    call = xacro.check_attrs
+
+    def checked(tag: Any, *attributes: Any) -> Any:
+        values = call(tag, *attributes)
+        declared.extend(values[:1] if tag.tagName == "xacro:arg" else ())
+        return values
+
+    xacro.check_attrs = checked
+    return declared
+
+
+def main(name: str, largest: str, most: str, *given: str) -> None:
+    """Expand one file to at most so many characters and elements, with the ``given`` arguments ``name:=value``."""
     limit()
     import xacro
     from xacro import substitution_args
 
     folder = Path(name).resolve().parent
-    at, errors = track_places(xacro), sys.stderr
+    at, declared, errors = track_places(xacro), list_declared(xacro), sys.stderr
+    assumed: dict[str, str] = {}
+    values = {name: value for name, _, value in (text.partition(":=") for text in given)}
     try:
         sys.stderr = open(os.devnull, "w")  # noqa: SIM115 (what the package warns of, without a limit)
-        restrict(xacro, substitution_args, folder)
-        made = xacro.process_file(name, verbosity=0)
+        restrict(xacro, substitution_args, folder, assumed)
+        made = xacro.process_file(name, verbosity=0, mappings=values)
         places = [getattr(each, "place", None) for each in made.getElementsByTagName("*")]
         text = made.toxml()
         if len(text) > int(largest):
@@ -370,7 +454,8 @@ def main(name: str, largest: str, most: str) -> None:
     except Exception as error:
         errors.write(json.dumps(describe_error(xacro, error, at)))
         sys.exit(1)
-    sys.stdout.write(json.dumps(places) + "\n" + text)
+    arguments = {argument: str(values[argument]) for argument in declared}
+    sys.stdout.write(json.dumps({"places": places, "arguments": arguments, "assumed": assumed}) + "\n" + text)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,8 @@ from pathlib import Path
 
 from ...file_format import FileFormat
 
+EXCLUDED = "physics:excludeFromArticulation"
+"""Attribute of a joint that closes a loop: the articulation of the others is a tree."""
 _TEXT, _BINARY = (b"#usda", b"#sdf"), (b"PXR-USDC", b"PK\x03\x04")
 
 
@@ -20,10 +22,10 @@ def _pack(text: str, path: Path) -> bytes:
 
 DIALECT = FileFormat(
     "usd",
-    lambda file: file.start.startswith((*_TEXT, *_BINARY)),
+    lambda file: file.data.startswith((*_TEXT, *_BINARY)),
     (".usda", ".usd", ".usdc"),
     rank=-2,
-    begins=(*_TEXT, *_BINARY),
     packed=_pack,
     meshes=None,
+    reread=False,
 )

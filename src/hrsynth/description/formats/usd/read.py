@@ -10,21 +10,25 @@ from typing import Any
 
 import numpy as np
 
-from ....budgets import FILE_NUMBER_MAX
 from ....errors import BadRobotFile, Defect
-from ....geometry.so3 import convert_from_quaternion, turn_about
+from ....geometry.so3 import convert_from_quaternion
 from ....geometry.vectors import Array, build_pose, freeze_array, invert_pose, normalise_vector, rotate_about_axis
 from ....mechanism.model import JointType, Limits, Link, Motor, make_fresh_name
-from ....tolerances import EXACT_INCIDENCE_TOL, INCIDENCE_TOL, SINGLE_PRECISION_TOL, VECTOR_LENGTH_MIN
+from ....tolerances import EXACT_INCIDENCE_TOL, INCIDENCE_TOL, VECTOR_LENGTH_MIN
 from ... import xml
 from ...annotations import PREFIX, drop_world, read_annotation
 from ...chains import name_chain_joint
 from ...contents import Content, Inertial, Solid, rotate_z_to, write_fragments
+from ...conversion import find_joint_value
 from ...file_format import RobotFile
 from ...jointgraph import ORIGIN, CouplingSpec, FrameSpec, JointGraph, JointSpec, join_names
 from ...jointmotion import compute_closure_residual
-from ...numerals import format_exact_vector
+from ...numerals import FILE_NUMBER_MAX, format_exact_vector
+from . import EXCLUDED
 from .stage import read_prims
+
+SINGLE_PRECISION_TOL = 1e-6
+"""Relative difference up to which a number of single precision equals one of double precision."""
 
 AXES = {"X": np.eye(3)[0], "Y": np.eye(3)[1], "Z": np.eye(3)[2]}
 _KINDS = {
@@ -34,6 +38,13 @@ _KINDS = {
     "PhysicsFixedJoint": JointType.FIXED,
 }
 FREEDOMS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
+_BOUNDS = "lowerLimit", "upperLimit", "low", "high", "maxForce"
+_NUMBERS = *_BOUNDS, "mass", "stiffness", "damping", "gearing", "offset", "radius", "height", "size"
+_LENGTHS = dict.fromkeys(_NUMBERS, 0)
+_LENGTHS |= dict.fromkeys(("centerOfMass", "diagonalInertia", "localPos0", "localPos1", "scale"), 3)
+_LENGTHS |= {"principalAxes": 4, "localRot0": 4, "localRot1": 4, "inertia": 6}
+"""Numbers in the value of an attribute, by the last part of its name; 0 for a number."""
+_SPACES = {"physics", "limit", "drive", "physxMimicJoint", PREFIX}
 _SWINGS = "D6 joints with two swings (Y, Z) are universal joints, first Y, then Z"
 _MIMIC = re.compile(r"physxMimicJoint:(\w+):gearing")
 
@@ -41,7 +52,7 @@ _MIMIC = re.compile(r"physxMimicJoint:(\w+):gearing")
 def read(file: RobotFile) -> JointGraph:
     """Return the joint graph of a USD stage. Raises ``BadRobotFile`` with all its defects, ``MissingExtra`` without the
     package of OpenUSD."""
-    if file.start.startswith(b"PK"):
+    if file.data.startswith(b"PK"):
         raise xml.make_file_error(
             file.path,
             "a zip archive, such as a package of USD files",
@@ -79,6 +90,8 @@ class _StageReader:
     """Link of each rigid body, by the path of its prim."""
     titles: dict[str, list[str]] = field(default_factory=dict)
     """Joints that each joint is read as, by the path of its prim."""
+    mistyped: list[str] = field(default_factory=list)
+    """Attributes whose values have not the type of their schema."""
 
     def defect(self, path: str, what: str, value: object = None, allowed: str | None = None) -> None:
         found = None if value is None else str(value)
@@ -96,13 +109,15 @@ class _StageReader:
         self.up = build_pose(rotation=rotate_about_axis((1, 0, 0), math.pi / 2)) if told["up"] == "Y" else np.eye(4)
         self.require_sound()
         self.prims = {each["path"]: self._prim(each) for each in told["prims"]}
-        own = [each for each in self.prims.values() if f"{PREFIX}:says" in each.values]
+        own = [each for each in self.prims.values() if isinstance(each.values.get(f"{PREFIX}:says"), list | dict)]
         name = own[0].values.get(f"{PREFIX}:name") if own else None
         graph = self.result = JointGraph(str(name or told["name"] or "robot"), self.file, "USD")
         if not told["metres_told"]:
             graph.note("assumption", "lengths are in centimetres, USD's default without metersPerUnit")
         if told["missing"]:
             graph.note("ignored", f"contents of missing files: {join_names(told['missing'])}")
+        if self.mistyped:
+            graph.note("ignored", f"attributes whose values are not of their type: {join_names(self.mistyped)}")
         for prim in self.prims.values():
             if prim.has_api("PhysicsRigidBodyAPI"):
                 self._body(prim)
@@ -110,6 +125,7 @@ class _StageReader:
         if not self.bodies:
             self.defect("/", "no rigid bodies", None, "prims with PhysicsRigidBodyAPI")
         self.require_sound()
+        graph.is_articulated = any(prim.has_api("PhysicsArticulationRootAPI") for prim in self.prims.values())
         self.world = graph.fresh("world")
         self.poses = {link: self.prims[path].X for path, link in self.bodies.items()}
         self.poses[self.world] = ORIGIN
@@ -147,7 +163,9 @@ class _StageReader:
 
     def _prim(self, told: Mapping[str, Any]) -> _Prim:
         """Return a prim with its pose: USD's matrices act on rows, and its lengths are in units of the stage."""
-        values, label = told["values"], told["values"].get(f"{PREFIX}:name")
+        values = {key: value for key, value in told["values"].items() if _has_type(key, value)}
+        label = values.get(f"{PREFIX}:name")
+        self.mistyped += [f"{told['path']}.{key}" for key in told["values"] if key not in values]
         name = label if isinstance(label, str) and label else told["name"]
         found = _Prim(told["path"], told["type"], tuple(told["apis"]), values, told["relations"], name, told)
         if told["X"] is None:
@@ -248,7 +266,7 @@ class _StageReader:
             scale = _read_vector(values.get(f"{PREFIX}:scale"))
             factors = tuple(float(v) for v in (sizes if address is None or scale is None else scale))
             return Solid("mesh", (), freeze_array(X), role, name, colour, str(address or own), factors)
-        along = AXES.get(values.get("axis", "Z"), AXES["Z"])
+        along = AXES.get(str(values.get("axis", "Z")), AXES["Z"])
         long = float(along @ sizes)
         across = [float(size) for size, each in zip(sizes, along, strict=True) if not each]
         rounds = max(sizes) - min(sizes) <= SINGLE_PRECISION_TOL * max(sizes)
@@ -301,7 +319,7 @@ class _StageReader:
             return
         name = make_fresh_name(prim.name, graph.joints)
         free = self._freedoms(prim)
-        excluded = values.get("physics:excludeFromArticulation") is True and len(free) < 6
+        excluded = values.get(EXCLUDED) is True and len(free) < 6
         before = set(graph.joints)
         self._add(name, prim, (one, two), free, in_tree=not excluded)
         self.titles[prim.path] = [each for each in graph.joints if each not in before]
@@ -478,38 +496,18 @@ class _StageReader:
                 self.result.gears.append(CouplingSpec(title, *names, ratio, offset or 0.0))
 
     def _stand(self, graph: JointGraph) -> None:
-        """Count joints from the file's poses of their bodies, if these are reached by the joint's motion."""
+        """Let the robot start where the file's poses of the bodies are, if the joints' motions reach them."""
         apart = []
         for name, joint in graph.joints.items():
             T, S = joint.frames(self.poses)
             D = invert_pose(T) @ S
-            if np.max(np.abs(D - np.eye(4))) <= EXACT_INCIDENCE_TOL:
+            if not joint.in_tree or np.max(np.abs(D - np.eye(4))) <= EXACT_INCIDENCE_TOL:
                 continue
-            if (
-                compute_closure_residual(
-                    joint, T, S, max(1.0, *(float(np.linalg.norm(end.X[:3, 3])) for end in joint.ends))
-                )
-                > INCIDENCE_TOL
-            ):
-                if joint.in_tree:
-                    apart.append(name)
-                continue
-            if not joint.in_tree:
-                continue
-            q, kind = 0.0, joint.kind
-            if kind is JointType.REVOLUTE:
-                q = turn_about(joint.axes[0], D[:3, :3])[0]
-            elif kind is JointType.PRISMATIC:
-                q = float(joint.axes[0] @ D[:3, 3])
-            axes = joint.axes
-            if kind is JointType.UNIVERSAL:
-                axes = freeze_array(D[:3, :3].T @ axes[0]), axes[1]
-            limits = joint.limits
-            if limits is not None and q:
-                lower, upper = (None if bound is None else bound - q for bound in (limits.lower, limits.upper))
-                limits = replace(limits, lower=lower, upper=upper)
-            near = replace(joint.ends[0], X=freeze_array(invert_pose(self.poses[joint.links[0]]) @ S))
-            graph.joints[name] = replace(joint, ends=(near, joint.ends[1]), axes=axes, limits=limits)
+            length = max(1.0, *(float(np.linalg.norm(end.X[:3, 3])) for end in joint.ends))
+            if compute_closure_residual(joint, T, S, length) > INCIDENCE_TOL:
+                apart.append(name)
+            else:
+                graph.start[name] = find_joint_value(joint, D)
         if apart:
             graph.note(
                 "assumption",
@@ -555,6 +553,18 @@ class _StageReader:
             self.result.note("assumption", what)
 
 
+def _has_type(key: str, value: Any) -> bool:
+    """Return False for an attribute whose value should be a number, or several, and is not; bounds may be infinite."""
+    *spaces, name = key.split(":")
+    if name not in _LENGTHS or value is None or not {*spaces[:1]} <= _SPACES:
+        return True
+    length = _LENGTHS[name]
+    numbers = value if isinstance(value, list) and length else [value]
+    if len(numbers) != max(1, length) or not all(isinstance(number, int | float) for number in numbers):
+        return False
+    return length > 0 or name in _BOUNDS or math.isfinite(value)
+
+
 def _is_locked(values: Mapping[str, Any], freedom: str) -> bool:
     low, high = (values.get(f"limit:{freedom}:physics:{key}") for key in ("low", "high"))
     return low is not None and high is not None and bool(low >= high)
@@ -567,24 +577,19 @@ def _round_single(value: Any) -> float:
     return float(str(np.float32(value))) if float(np.float32(value)) == value else float(value)
 
 
-def _read_vector(value: Any, exact: Any = None) -> Array | None:
-    """Return three finite numbers; those of double precision next to them if they are the same."""
-    found = np.array(value, dtype=float) if isinstance(value, list) and len(value) == 3 else None
-    if found is None or not np.all(np.isfinite(found)):
+def _read_vector(value: Any, exact: Any = None, count: int = 3) -> Array | None:
+    """Return so many finite numbers, as decimals; those of double precision next to them if they are the same."""
+    numbers = np.array(value, dtype=float) if isinstance(value, list) and len(value) == count else None
+    if numbers is None or not np.all(np.isfinite(numbers)):
         return None
-    if isinstance(exact, list) and len(exact) == 3:
+    if isinstance(exact, list) and len(exact) == count:
         better = np.array(exact, dtype=float)
-        if np.max(np.abs(better - found)) <= SINGLE_PRECISION_TOL * max(1.0, float(np.max(np.abs(found)))):
+        if np.max(np.abs(better - numbers)) <= SINGLE_PRECISION_TOL * max(1.0, float(np.max(np.abs(numbers)))):
             return better
-    return np.array([_round_single(v) for v in found])
+    return np.array([_round_single(v) for v in numbers])
 
 
 def _read_quaternion(value: Any, exact: Any = None) -> Array | None:
-    """Return a quaternion w x y z as it is written, in the same manner; None if it is invalid."""
-    found = np.array(value, dtype=float) if isinstance(value, list) and len(value) == 4 else None
-    if found is None or not np.linalg.norm(found) > VECTOR_LENGTH_MIN or not np.all(np.isfinite(found)):
-        return None
-    if isinstance(exact, list) and len(exact) == 4:
-        better = np.array(exact, dtype=float)
-        found = better if np.max(np.abs(better - found)) <= SINGLE_PRECISION_TOL else found
-    return found
+    """Return a quaternion w x y z in the same manner; None if it is invalid."""
+    turn = _read_vector(value, exact, 4)
+    return turn if turn is not None and np.linalg.norm(turn) > VECTOR_LENGTH_MIN else None

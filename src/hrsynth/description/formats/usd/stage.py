@@ -9,9 +9,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ....budgets import INCLUDED_FILES_MAX, ROBOT_FILE_MAX_BYTES, USD_SECONDS
 from ....errors import BadRequest, MissingExtra
 from ....processes import require_posix
+from ....tolerances import INCLUDED_FILES_MAX, ROBOT_FILE_MAX_BYTES, USD_SECONDS
 from ....untrusted import run_program
 from ... import xml
 

@@ -85,12 +85,15 @@ def read_colour(prim: Any) -> Any:
         each.ComputeFlattened() if (each := UsdGeom.PrimvarsAPI(prim).GetPrimvar(name)) else None
         for name in ("displayColor", "displayOpacity")
     )
-    if own:
-        return [*map(float, own[0]), float(clear[0]) if clear else 1.0] if len(own) == 1 else None
-    material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
-    shader = material.ComputeSurfaceSource()[0] if material else None
-    found = shader.GetInput("diffuseColor").Get() if shader and shader.GetInput("diffuseColor") else None
-    return None if found is None else [*map(float, found), 1.0]
+    try:
+        if own:
+            return [*map(float, own[0]), float(clear[0]) if clear else 1.0] if len(own) == 1 else None
+        material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
+        shader = material.ComputeSurfaceSource()[0] if material else None
+        colour = shader.GetInput("diffuseColor").Get() if shader and shader.GetInput("diffuseColor") else None
+        return None if colour is None else [*map(float, colour), 1.0]
+    except (TypeError, ValueError):  # values that are no colours
+        return None
 
 
 def describe_stage(stage: Any) -> dict[str, Any]:

@@ -23,6 +23,7 @@ from ...file_format import Written
 from ...jointgraph import join_names
 from ...meshes import read_robot_meshes
 from ...tree import build_spanning_mechanism, list_outward_joints
+from . import EXCLUDED
 from .read import FREEDOMS
 
 _TYPES = {
@@ -180,7 +181,7 @@ class _UsdWriter:
         X_J = build_pose(joint.point, _build_frame(joint, robot))
         lines = _label(joint.name, self.joints[joint.name])
         if not joint.in_tree or kind is JointType.FREE:
-            lines.append("uniform bool physics:excludeFromArticulation = true")
+            lines.append(f"uniform bool {EXCLUDED} = true")
         for side, link in enumerate(joint.links):
             X = invert_pose(robot.links[link].pose) @ X_J
             turn = convert_to_quaternions(X[:3, :3])
@@ -208,11 +209,10 @@ class _UsdWriter:
 
     def _mimic(self, joint: Joint, free: tuple[str, ...], apis: list[str]) -> Iterator[str]:
         """Return a coupling in PhysX's form: q + gearing × q of the reference = 0."""
-        carriers = {each.successor: each for each in self.robot.joints.values() if each.in_tree}
         for gear in self.robot.couplings:
-            if carriers.get(gear.successor) is not joint:
+            if gear.driven != joint.name:
                 continue
-            other = carriers[gear.predecessor]
+            other = self.robot.joints[gear.driver]
             if len(free) != 1 or other.type is not joint.type:
                 what = f"USD has no coupling between a rotation and a translation; not written: {gear.name}"
                 self.lost.append(Note("warning", what))
