@@ -207,6 +207,16 @@ DEFECTS: dict[str, tuple[list, list[tuple[int, str]]]] = {
         ],
         [(34, "ratio of a coupling would fix its second joint, -0, a number other than 0")],
     ),
+    "gear of the base": (
+        [
+            (
+                34,
+                '<coupling name="g"><predecessor link="base"/><successor link="bar"/>'
+                '<ratio value="2"/></coupling><transmission name="m">',
+            )
+        ],
+        [(34, "coupling 'g': a link that no joint carries")],
+    ),
     "document type": (
         [(1, '<!DOCTYPE robot [<!ENTITY a "b">]>\n<robot name="&a;">')],
         [(1, "a document type declaration")],
@@ -264,7 +274,7 @@ def test_a_message_is_one_line_with_file_line_value_and_what_is_allowed():
         ("junk", 1, "malformed XML"),
         ("<robot", 1, "malformed XML"),
         ('<robot name="x"/>', 1, "no links"),
-        ('<robot xmlns="urn:x" name="x"/>', 1, "root element, {urn:x}robot, robot"),
+        ('<x:robot xmlns:x="urn:x" name="x"/>', 1, "root element, {urn:x}robot, robot"),
         ("<robot name='x'>" + "<a>" * 5000 + "</a>" * 5000 + "</robot>", 1, "malformed XML"),
         ('<?xml version="1.0" encoding="no-such"?><robot name="x"/>', 1, "malformed XML"),
     ],

@@ -142,3 +142,14 @@ def test_a_new_file_has_the_permissions_that_the_user_set(tmp_path: Path, mask: 
     finally:
         os.umask(before)
     assert (tmp_path / "robot.urdf").stat().st_mode & 0o777 == 0o666 & ~mask
+
+
+@pytest.mark.parametrize(("content", "hides"), [(b"\x7fELF\xff", False), (b"", False), (b" <robot name='x'/>", True)])
+def test_only_a_robot_file_hides_a_shipped_robot_of_its_name(
+    content: bytes, hides: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    (tmp_path / "quattro").write_bytes(content)
+    monkeypatch.chdir(tmp_path)
+    assert (description.find_robot_file("quattro") == Path("quattro")) is hides
+    assert hides or description.load("quattro").name == "quattro"
+    assert description.find_robot_file("./quattro") == Path("quattro")

@@ -19,7 +19,6 @@ from hrsynth.geometry.vectors import build_pose, convert_rpy_to_rotation
 from hrsynth.mechanism.model import Coupling, Joint, JointType, Limits, Link, Mechanism, Motor
 from hrsynth.mechanism.observation import Observation
 from hrsynth.mechanism.observations.direction import Direction
-from hrsynth.tolerances import ZERO_ASSEMBLY_TOL
 
 IN_TREE = list(JointType)
 IN_LOOP = [kind for kind in JointType if kind is not JointType.FREE]
@@ -114,9 +113,9 @@ def test_a_written_file_is_assembled_at_zero(mechanism: Mechanism):
         ]
         kind = LOOP_TYPES[loop.get("type")]
         spec = JointSpec(loop.get("name"), kind, (FrameSpec("a"), FrameSpec("b")), tuple(axes))
-        assert compute_closure_residual(spec, ends[0], ends[1], mechanism.length) <= ZERO_ASSEMBLY_TOL
+        assert compute_closure_residual(spec, ends[0], ends[1], mechanism.length) <= 1e-12
         if kind is JointType.UNIVERSAL:
-            assert abs((ends[0][:3, :3] @ axes[0]) @ (ends[1][:3, :3] @ axes[1])) <= ZERO_ASSEMBLY_TOL
+            assert abs((ends[0][:3, :3] @ axes[0]) @ (ends[1][:3, :3] @ axes[1])) <= 1e-12
     assert loops
 
 
@@ -235,6 +234,29 @@ def test_a_chain_whose_link_in_between_bears_something_stays_a_chain():
         "tree_0__3",
     ]
     check_round_trip(native.parse(text))
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_a_chain_with_a_coupled_joint_stays_a_chain(number: int):
+    chain = native.write(every_joint([JointType.UNIVERSAL, JointType.REVOLUTE], [JointType.REVOLUTE], 2))
+    carried = {joint.name: joint.successor for joint in native.parse(chain.replace("tree_0__", "N_")).joints.values()}
+    names = (carried[name].replace("N_", "tree_0__") for name in (f"N_{number}", "tree_1"))
+    one, two = (f'<{end} link="{name}"/>' for end, name in zip(("predecessor", "successor"), names, strict=True))
+    text = chain.replace("<hrsynth", f'<coupling name="g">{one}{two}<ratio value="2"/></coupling><hrsynth')
+    robot = check_round_trip(native.parse(text))
+    (gear,) = robot.couplings
+    assert (gear.driver, gear.driven) == (f"tree_0__{number}", "tree_1")
+
+
+def test_a_coupling_may_name_a_link_fixed_to_the_one_that_its_joint_carries():
+    coupling = '<coupling name="g"><predecessor link="{}"/><successor link="rocker"/><ratio value="-1"/></coupling>'
+    weld = '<link name="tip"/><joint name="weld" type="fixed"><parent link="crank"/><child link="tip"/></joint>'
+    one, other = (
+        native.parse(FOUR_BAR.replace("<transmission", weld + coupling.format(link) + "<transmission"))
+        for link in ("crank", "tip")
+    )
+    assert one.couplings[0].driver == "a"
+    assert other.differences(one) == []
 
 
 def test_both_motors_of_a_universal_joint_are_one():
@@ -370,7 +392,7 @@ def test_limits_that_urdf_has_defaults_for(attributes: str, limits: Limits | Non
 
 
 def test_gears_come_back():
-    gears = Coupling("g", "arm_0", "arm_1", -1 / 3), Coupling("h", "arm_1", "arm_2", 2.0)
+    gears = Coupling("g", "shoulder_0", "shoulder_1", -1 / 3), Coupling("h", "shoulder_1", "shoulder_2", 2.0)
     robot = replace(with_rods(), couplings=gears)
     read = check_round_trip(robot)
     assert read.couplings == gears

@@ -220,7 +220,7 @@ def test_commands_that_know_segments_only_say_so(
     save(add_observations(load("delta"), [parse_sensor("point:platform@0,0,0.1", [])]), tmp_path / "delta.urdf")
     words = ["--start", "x=0", "--goal", "x=0.01", "--dynamics"]
     assert run_command([command, str(tmp_path / "delta.urdf"), *words]) == 2
-    assert "supports directions of segments only: got 'point point_1'" in capsys.readouterr().err
+    assert "supports directions of segments only: got 'observation point_1 (point)'" in capsys.readouterr().err
 
 
 @pytest.mark.some(1)

@@ -14,7 +14,7 @@ joint of that name joins the link. Points and axes are compared at the zero conf
 from __future__ import annotations
 
 import re
-from collections.abc import Container
+from collections.abc import Container, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -52,19 +52,20 @@ def require_free(name: str, joint: Joint, *taken: Container[str]) -> None:
     """Raise ``BadRequest`` if a name of a written joint is already taken."""
     if any(name in each for each in taken):
         raise BadRequest(
-            f"a part of joint {joint.name!r} would get a name that is taken",
-            name,
-            "another name for that part",
+            f"joint {joint.name!r} is written in several parts, and one would be named {name!r}, which a link or joint "
+            "of the robot already has",
+            remedy="Rename that link or joint, or this joint.",
         )
 
 
-def merge(mechanism: Mechanism) -> Mechanism:
-    """Return the mechanism with every chain and tip merged into one joint; chains that do not fit exactly stay."""
+def merge(mechanism: Mechanism, geared: Container[str] = ()) -> Mechanism:
+    """Return the mechanism with every chain and tip merged into one joint; chains that do not fit exactly stay, as do
+    those with joints that are coupled, or to be so (``geared``)."""
     links, joints = dict(mechanism.links), dict(mechanism.joints)
     busy = {mechanism.base, mechanism.platform, mechanism.reference}
     busy |= {link for o in mechanism.observations for link in (o.link, o.seen_from) if link is not None}
     busy |= {camera.link for camera in mechanism.cameras}
-    busy |= {link for coupling in mechanism.couplings for link in (coupling.predecessor, coupling.successor)}
+    busy |= mechanism.coupled_links
     degree: dict[str, int] = {}
     for joint in joints.values():
         for end in joint.links:
@@ -100,11 +101,13 @@ def merge(mechanism: Mechanism) -> Mechanism:
         if (
             name in joints
             or len(chain) < 2
+            or any(joint.name in geared or joint.name in mechanism.coupled_joints for joint in chain)
             or [joint.name for joint in chain] != [name_chain_joint(name, number + 1) for number in range(len(chain))]
         ):
             continue
         between = [links.get(joint.successor) for joint in chain[:-1]]
-        whole = _recognise_chain(name, chain, between, mechanism.length) if all(map(bare, between)) else None
+        apart = POINT_DISTANCE_TOL * mechanism.length
+        whole = recognise_chain(name, chain, between, apart, DIRECTION_SINE_TOL) if all(map(bare, between)) else None
         if whole is not None:
             for joint in chain[:-1]:
                 del links[joint.successor]
@@ -114,8 +117,11 @@ def merge(mechanism: Mechanism) -> Mechanism:
     return replace(mechanism, links=links, joints={joint.name: joint for joint in kept})
 
 
-def _recognise_chain(name: str, chain: list[Joint], between: list[Link | None], length: float) -> Joint | None:
-    """Return the joint that a chain forms, or None if its links, geometry, motors or limits do not fit."""
+def recognise_chain(
+    name: str, chain: Sequence[Joint], between: Sequence[Link | None], apart: float, turned: float
+) -> Joint | None:
+    """Return the joint that a chain forms, or None if its links, motors, limits or geometry do not fit: centres that
+    are more than ``apart`` (m), axes more than ``turned`` (rad)."""
     first = chain[0]
     for number, (before, after) in enumerate(pairwise(chain), 1):
         own = name_chain_joint(name, number)
@@ -123,7 +129,7 @@ def _recognise_chain(name: str, chain: list[Joint], between: list[Link | None], 
             return None
     if any(
         not joint.in_tree
-        or np.linalg.norm(joint.point - first.point) > POINT_DISTANCE_TOL * length
+        or np.linalg.norm(joint.point - first.point) > apart
         or joint.limits != first.limits
         or joint.is_actuated != first.is_actuated
         or (joint.xml and joint is not first)
@@ -137,14 +143,14 @@ def _recognise_chain(name: str, chain: list[Joint], between: list[Link | None], 
     match kind:
         case JointType.SPHERICAL:
             frame = None if between[0] is None else between[0].pose[:3, :3]
-            same = frame is not None and np.max(np.abs(np.array(axes).T - frame)) <= DIRECTION_SINE_TOL
+            same = frame is not None and np.max(np.abs(np.array(axes).T - frame)) <= turned
             axes = []
         case JointType.CYLINDRICAL:
-            same = np.linalg.norm(axes[0] - axes[1]) <= DIRECTION_SINE_TOL
+            same = np.linalg.norm(axes[0] - axes[1]) <= turned
             axes = axes[1:]
         case _:
             gram = np.array([[a @ b for a in axes] for b in axes])
-            same = np.max(np.abs(gram - np.eye(len(axes)))) <= DIRECTION_SINE_TOL
+            same = np.max(np.abs(gram - np.eye(len(axes)))) <= turned
             axes = axes if kind is JointType.UNIVERSAL else axes[2:]
     if not same:
         return None
@@ -159,14 +165,14 @@ def _recognise_chain(name: str, chain: list[Joint], between: list[Link | None], 
     )
 
 
-def _find_offset(kind: JointType, chain: list[Joint]) -> Array | None:
+def _find_offset(kind: JointType, chain: Sequence[Joint]) -> Array | None:
     """Return the offset from which the file counts the whole joint; not kept for spherical and planar joints."""
     if kind not in (JointType.UNIVERSAL, JointType.CYLINDRICAL) or all(joint.offset is None for joint in chain):
         return None
     return np.concatenate([np.zeros(1) if joint.offset is None else joint.offset for joint in chain])
 
 
-def _merge_motors(chain: list[Joint]) -> Motor | None:
+def _merge_motors(chain: Sequence[Joint]) -> Motor | None:
     motors = [joint.motor for joint in chain if joint.motor is not None]
     if not motors:
         return None

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..budgets import FILE_DEFECTS_MAX
 from ..errors import BadRobotFile, Defect
 from ..geometry.so3 import convert_from_quaternion
 from ..geometry.vectors import Array, normalise_vector
@@ -16,19 +15,21 @@ from ..tolerances import VECTOR_LENGTH_MIN
 from . import numerals, xml
 from .jointgraph import ORIGIN, Z
 
+FILE_DEFECTS_MAX = 100
+"""Number of defects after which a file is not read further."""
+
 LIMITS = ("lower", "upper", "velocity", "effort")
 TURNS: dict[str, bool | None] = {"true": True, "false": False}
 """Values of a platform's ``turns``."""
 
 
 @dataclass
-class XmlReader:
-    """Document and its defects; base of the readers of all XML formats."""
+class FileReader:
+    """File and its defects; base of the readers of all texts."""
 
     file: str
-    root: xml.Element
-    defects: list[Defect] = field(default_factory=list)
-    digits: numerals.Digits = field(default_factory=numerals.Digits)
+    defects: list[Defect] = field(default_factory=list, kw_only=True)
+    digits: numerals.Digits = field(default_factory=numerals.Digits, kw_only=True)
 
     def defect(self, line: int | None, what: str, value: str | None = None, allowed: str | None = None) -> None:
         """Record a defect in a line of the file (or of an included one). Raises ``BadRobotFile`` at the limit of
@@ -44,6 +45,34 @@ class XmlReader:
         """Raise :class:`BadRobotFile` with all defects found so far, if any."""
         if self.defects:
             raise BadRobotFile(self.defects)
+
+    def values(self, text: str | None, default: Iterable[float], line: int | None, what: str) -> Array:
+        """Return the numbers of a text, as many as the default has; the default if the text is absent or wrong."""
+        fallback = np.array(list(default), dtype=float)
+        if text is None:
+            return fallback
+        try:
+            found = numerals.parse(text, len(fallback))
+            self.digits.read(text)
+            return found
+        except ValueError as error:
+            self.defect(line, what, text, str(error))
+            return fallback
+
+    def unit(self, values: Array, line: int | None, what: str, given: str | None = None, default: Array = Z) -> Array:
+        """Return the unit vector along ``values``; a zero vector is a defect."""
+        if (size := float(np.linalg.norm(values))) > VECTOR_LENGTH_MIN:
+            self.digits.length(size)
+            return normalise_vector(values)
+        self.defect(line, what, given, "a non-zero vector")
+        return default
+
+
+@dataclass
+class XmlReader(FileReader):
+    """Document and its defects; base of the readers of all XML formats."""
+
+    root: xml.Element
 
     def require_some(self, found: Collection[object], what: str, element: xml.Element) -> None:
         """Record that a file holds no links."""
@@ -62,19 +91,6 @@ class XmlReader:
             self.defect(xml.get_line(element), f"<{element.tag}> without {name}")
             return None
         return value
-
-    def values(self, text: str | None, default: Iterable[float], line: int | None, what: str) -> Array:
-        """Return the numbers of a text, as many as the default has; the default if the text is absent or wrong."""
-        fallback = np.array(list(default), dtype=float)
-        if text is None:
-            return fallback
-        try:
-            found = numerals.parse(text, len(fallback))
-            self.digits.read(text)
-            return found
-        except ValueError as error:
-            self.defect(line, what, text, str(error))
-            return fallback
 
     def numbers(self, element: xml.Element, name: str, default: Iterable[float]) -> Array:
         """Return the numbers of an attribute."""
@@ -98,14 +114,6 @@ class XmlReader:
     def origin(self, element: xml.Element) -> Array:
         """Return the pose of the ``<origin>`` of an element."""
         return self.pose(self.only(element, "origin"))
-
-    def unit(self, values: Array, line: int | None, what: str, given: str | None = None, default: Array = Z) -> Array:
-        """Return the unit vector along ``values``; a zero vector is a defect."""
-        if (size := float(np.linalg.norm(values))) > VECTOR_LENGTH_MIN:
-            self.digits.length(size)
-            return normalise_vector(values)
-        self.defect(line, what, given, "a non-zero vector")
-        return default
 
     def direction(self, element: xml.Element, name: str, default: Iterable[float]) -> Array:
         """Return the unit vector of an attribute."""

@@ -73,7 +73,7 @@ def require_same(path: Path, content: bytes) -> None:
         raise BadRequest(
             "cannot write the file that goes with it: it exists with other content",
             str(path),
-            "another name",
+            remedy="Move it, or choose another output.",
         )
 
 

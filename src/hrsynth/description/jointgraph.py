@@ -8,13 +8,15 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
-from ..geometry.vectors import Array, build_plane_axes, freeze_array, hat, invert_pose, normalise_vector
+from ..geometry.vectors import Array, freeze_array, invert_pose
 from ..mechanism import graphs
 from ..mechanism.cameras import NamedCamera
 from ..mechanism.model import JointType, Limits, Link, Motor, Note, make_fresh_name
 from ..mechanism.observations.direction import Direction
-from ..mechanism.screws import split_elementary
+from ..mechanism.screws import list_transmitted_wrenches
+from ..tolerances import VECTOR_LENGTH_MIN
 from .numerals import Digits
 from .observation_text import ObservationSpec
 
@@ -31,19 +33,6 @@ LOOP_TYPES = {
     "fixed": JointType.FIXED,
 }
 """Names of joint types in a ``<loop>``."""
-
-_COST = {
-    JointType.FIXED: 0,
-    JointType.REVOLUTE: 1,
-    JointType.PRISMATIC: 1,
-    JointType.UNIVERSAL: 2,
-    JointType.CYLINDRICAL: 2,
-    JointType.PLANAR: 3,
-    JointType.SPHERICAL: 3,
-    JointType.FREE: 5,
-}
-_NON_TREE_JOINT_COST_COUNT = 20
-"""Added to the cost of a joint that the file does not write as part of its tree."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,17 +70,11 @@ class JointSpec:
         return str(self.ends[0].link), str(self.ends[1].link)
 
     @cached_property
-    def parts(self) -> list[tuple[Array, Array | None]]:
-        """Axis a of each one-dof joint of the equivalent chain, and [a]ₓ if it rotates about a, else None."""
-        return [
-            (axis, None if kind is JointType.PRISMATIC else hat(normalise_vector(axis)))
-            for kind, axis in split_elementary(self.kind, self.axes)
-        ]
-
-    @cached_property
-    def across(self) -> Array:
-        """Two unit vectors normal to the first axis and to each other, (2, 3)."""
-        return build_plane_axes(self.axes[0])
+    def wrenches(self) -> Array:
+        """Unit wrenches that the joint transmits, (6 − dof, 6), in its predecessor's frame where both frames
+        coincide."""
+        found = np.array(list_transmitted_wrenches(self.kind, np.zeros(3), self.axes)).reshape(-1, 6)
+        return np.asarray(found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), VECTOR_LENGTH_MIN))
 
     def frames(self, poses: Mapping[str, Array]) -> tuple[Array, Array]:
         """Return the poses (4, 4) of both joint frames for the links' ``poses``."""
@@ -101,7 +84,8 @@ class JointSpec:
 
 @dataclass(frozen=True)
 class CouplingSpec:
-    """Coupling as a file gives it: coordinate of joint ``driven`` = ratio × that of ``driver`` + offset."""
+    """Coupling as a file gives it: coordinate of joint ``driven`` = offset + ratio × that of ``driver``, and terms of
+    its square, cube … (``curve``)."""
 
     name: str
     driver: str
@@ -109,6 +93,19 @@ class CouplingSpec:
     ratio: float
     offset: float = 0.0
     line: int | None = None
+    curve: tuple[float, ...] = ()
+
+    @property
+    def polynomial(self) -> Polynomial:
+        """Coordinate of the driven joint by that of its driver."""
+        return Polynomial((self.offset, self.ratio, *self.curve))
+
+    def scaled(self, driver: float, driven: float) -> CouplingSpec:
+        """Return the coupling with the coordinates of both joints multiplied by factors."""
+        offset, ratio, *curve = (
+            value * driven / driver**power for power, value in enumerate((self.offset, self.ratio, *self.curve))
+        )
+        return replace(self, ratio=ratio, offset=offset, curve=tuple(curve))
 
 
 Posture = Mapping[str, Array]
@@ -129,7 +126,7 @@ def find_first_body(
 
 @dataclass
 class JointGraph:
-    """Content of a foreign file. With every tree joint at zero its frames on both links coincide."""
+    """Content of a file. With every tree joint at zero its frames on both links coincide."""
 
     name: str
     file: str
@@ -151,14 +148,24 @@ class JointGraph:
     rest: list[str] = field(default_factory=list)
     notes: list[Note] = field(default_factory=list)
     digits: Digits = field(default_factory=Digits)
+    frames: dict[str, FrameSpec] = field(default_factory=dict)
+    """Frames of the file besides those of its links; closures may be given at them."""
+    arguments: Mapping[str, str] = field(default_factory=dict)
+    """Arguments that a xacro file declares, and their values."""
+    is_articulated: bool = False
+    """A simulator is to treat the joints of the file's tree as one articulation, which must be a tree."""
     closing: set[str] = field(default_factory=set)
     """Frames that only mark where a loop closes."""
     assumed: dict[str, list[str]] = field(default_factory=dict)
     """Assumptions of one kind about many joints: the text, and the joints."""
     postures: dict[str, Posture] = field(default_factory=dict)
     """Keyframes of the file."""
+    start: dict[str, Array] = field(default_factory=dict)
+    """Values of joints in the configuration that the file shows."""
     unit: float = 1.0
     """Metres in the file's unit of length, which keyframes keep."""
+    is_complete: bool = False
+    """The file gives everything: base, platform, a tree directed outward, and a zero configuration that is closed."""
 
     def note(self, kind: str, text: str, *, base: bool = False) -> None:
         """Record what reading assumed, solved or ignored; ``base``: it is about the choice of the base."""
@@ -172,7 +179,7 @@ class JointGraph:
 
     def fresh(self, name: str) -> str:
         """Return ``name``, or ``name_2``, ``name_3`` … if it is taken."""
-        return make_fresh_name(name, self.links, self.joints)
+        return make_fresh_name(name, self.links, self.joints, {gear.name for gear in self.gears})
 
     @property
     def named(self) -> tuple[set[str | None], set[str]]:
@@ -182,6 +189,11 @@ class JointGraph:
         joints = {name for gear in self.gears for name in (gear.driver, gear.driven)}
         seen = {each.link for each in self.sights}
         return links | seen, joints | (seen - self.links.keys())
+
+    @property
+    def watched(self) -> list[str]:
+        """Links and joints that observations of other kinds name, and links with named cameras."""
+        return [*(each.link for each in self.sights), *(each.link for each in self.cameras)]
 
     def close(
         self,
@@ -208,8 +220,9 @@ class JointGraph:
         """Scale all lengths: frames on links, limits and couplings of prismatic joints."""
         self.unit *= factor
         slides = {name for name, joint in self.joints.items() if joint.type is JointType.PRISMATIC}
+        self.frames = {name: scale_frame(frame, factor) for name, frame in self.frames.items()}
         for name, joint in self.joints.items():
-            one, two = (FrameSpec(end.link, scale_pose(end.X, factor), end.line) for end in joint.ends)
+            one, two = (scale_frame(end, factor) for end in joint.ends)
             limits = joint.limits
             if limits is not None and name in slides:
                 lower, upper, velocity = (
@@ -227,14 +240,7 @@ class JointGraph:
         ]
         self.cameras = [replace(each, pose=scale_pose(each.pose, factor)) for each in self.cameras]
         units = {name: factor if name in slides else 1.0 for name in self.joints}
-        self.gears = [
-            replace(
-                gear,
-                ratio=gear.ratio * units[gear.driven] / units[gear.driver],
-                offset=gear.offset * units[gear.driven],
-            )
-            for gear in self.gears
-        ]
+        self.gears = [gear.scaled(units[gear.driver], units[gear.driven]) for gear in self.gears]
 
     def in_metres(self, posture: Posture) -> Posture:
         """Return a keyframe of the file with its lengths in metres."""
@@ -282,6 +288,11 @@ def scale_pose(X: Array, factor: float) -> Array:
     return freeze_array(larger)
 
 
+def scale_frame(frame: FrameSpec, factor: float) -> FrameSpec:
+    """Return a frame with its translation scaled."""
+    return FrameSpec(frame.link, scale_pose(frame.X, factor), frame.line)
+
+
 TreeJoint = tuple[JointSpec, str, str]
 """Joint of a tree, the link nearer to the base, the link that it carries."""
 
@@ -291,7 +302,7 @@ def build_spanning_tree(base: str, joints: Iterable[JointSpec]) -> list[TreeJoin
     with fewer dof before joints with more."""
     bonds = list(joints)
     links = dict.fromkeys([base, *(link for joint in bonds for link in joint.links)])
-    weights = [_COST[joint.kind] + (0 if joint.in_tree else _NON_TREE_JOINT_COST_COUNT) for joint in bonds]
+    weights = [(not joint.in_tree, joint.kind.freedoms) for joint in bonds]
     return graphs.order_outward(base, graphs.build_spanning_forest(links, bonds, weights))
 
 

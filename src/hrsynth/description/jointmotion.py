@@ -1,123 +1,54 @@
-"""Motion of a joint: displacement between its two frames, its screws, and the closure residual of a loop.
-
-A *value* holds a joint's coordinates: an array for R, P, U, C, E, the displacement (4, 4) itself for S and free joints.
-"""
+"""Closure residual of a joint: the distances and angles of its two frames that it does not allow."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import LoopClosureFailure
-from ..geometry.screws import make_rotation_twist, make_translation_twist
-from ..geometry.so3 import convert_rotations_to_vectors, convert_vectors_to_rotations
-from ..geometry.vectors import Array, build_pose, hat
+from ..geometry.so3 import convert_rotations_to_vectors, find_smallest_rotations
+from ..geometry.vectors import Array, cross, find_perpendicular, invert_pose
 from ..mechanism.model import JointType
-from ..tolerances import (
-    DIRECTION_SINE_TOL,
-    EXACT_INCIDENCE_TOL,
-    GEOMETRY_DIFFERENCE_TOL,
-    INCIDENCE_TOL_MAX,
-    VECTOR_LENGTH_MIN,
-)
+from ..tolerances import EXACT_INCIDENCE_TOL, GEOMETRY_DIFFERENCE_TOL, INCIDENCE_TOL_MAX
 from .jointgraph import JointSpec
 
-_MATRIX = (JointType.SPHERICAL, JointType.FREE)
 
+def compute_closure_errors(joints: Sequence[JointSpec], D: Array) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Return the closure residuals of joints (rows,), 6 − dof of each, their derivatives (rows, 6) by the twist of the
+    joint's second frame relative to its first, in the first, and the number of the joint (rows,).
 
-def get_zero_value(joint: JointSpec) -> Array:
-    """Return the value at which both frames coincide."""
-    return np.eye(4) if joint.kind in _MATRIX else np.zeros(joint.kind.freedoms)
-
-
-def compute_joint_pose(joint: JointSpec, value: Array) -> Array:
-    """Return the pose (4, 4) of the successor's joint frame in the predecessor's, one motion after the other."""
-    if joint.kind in _MATRIX:
-        return value
-    found = None
-    for (axis, K), q in zip(joint.parts, value, strict=True):
-        X = np.eye(4)
-        if K is None:
-            X[:3, 3] = axis * q
-        else:
-            X[:3, :3] += np.sin(q) * K + (1 - np.cos(q)) * (K @ K)
-        found = X if found is None else found @ X
-    return np.eye(4) if found is None else found
-
-
-def step_along(joint: JointSpec, value: Array, step: Array, R_predecessor: Array) -> Array:
-    """Return the value after a step along the screws of :func:`compute_joint_screws`."""
-    if joint.kind not in _MATRIX:
-        return value + step
-    angular = R_predecessor.T @ step[-3:]
-    shift = R_predecessor.T @ step[:3] if joint.kind is JointType.FREE else np.zeros(3)
-    return build_pose(value[:3, 3] + shift, convert_vectors_to_rotations(angular) @ value[:3, :3])
-
-
-def compute_joint_screws(joint: JointSpec, X_P: Array, X_S: Array) -> list[Array]:
-    """Return the twists (linear at the base origin, angular) of the successor relative to the predecessor, one for each
-    coordinate; ``X_P`` and ``X_S`` are the poses of the joint's two frames."""
-    found = []
-    for number, (axis, K) in enumerate(joint.parts):
-        if joint.kind not in _MATRIX:
-            axis = (X_S if joint.kind is JointType.UNIVERSAL and number == 1 else X_P)[:3, :3] @ axis
-        found.append(make_translation_twist(axis) if K is None else make_rotation_twist(axis, X_S[:3, 3]))
-    return found
-
-
-def compute_closure_error(joint: JointSpec, X_P: Array, X_S: Array) -> tuple[Array, Array]:
-    """Return the closure residual of a joint's two frames, (6 − dof,), and its derivative by the twist of the successor
-    relative to the predecessor, (6 − dof, 6)."""
-    gap, turn, rows = _compute_misses(joint, X_P, X_S)
-    return np.concatenate([gap, turn]), rows
-
-
-def _compute_misses(joint: JointSpec, X_P: Array, X_S: Array) -> tuple[Array, Array, Array]:
-    """Return the distance and the rotation that the joint does not allow, and the derivative of both."""
-    kind = joint.kind
-    if kind is JointType.FREE:
-        return np.zeros(0), np.zeros(0), np.zeros((0, 6))
-    R, p = X_P[:3, :3], X_S[:3, 3]
-    gap, D = R.T @ (p - X_P[:3, 3]), R.T @ X_S[:3, :3]
-    gap_rows, turn_rows = np.zeros((3, 6)), np.zeros((3, 6))
-    gap_rows[:, :3] = turn_rows[:, 3:] = R.T
-    gap_rows[:, 3:] = -R.T @ hat(p)
-    if kind in (JointType.PRISMATIC, JointType.FIXED):
-        turn = convert_rotations_to_vectors(D)
-    elif kind is JointType.SPHERICAL:
-        turn, turn_rows = np.zeros(0), np.zeros((0, 6))
-    elif kind is JointType.UNIVERSAL:
-        second = D @ joint.axes[1]
-        turn = np.array([joint.axes[0] @ second])
-        turn_rows = (joint.axes[0] @ -hat(second) @ turn_rows)[None]
-    else:
-        moving, across = D @ joint.axes[0], joint.across
-        turn = _bound_opposite_axis(across @ moving) if joint.axes[0] @ moving < 0 else across @ moving
-        turn_rows = across @ -hat(moving) @ turn_rows
-    if kind.has_translation:
-        gap, gap_rows = joint.across @ gap, joint.across @ gap_rows
-    elif kind is JointType.PLANAR:
-        gap, gap_rows = joint.axes[:1] @ gap, joint.axes[:1] @ gap_rows
-    return gap, turn, np.vstack([gap_rows, turn_rows])
-
-
-def _bound_opposite_axis(turn: Array) -> Array:
-    """Return the error of an axis that points the opposite way: it grows with the angle, as it does on the near
-    side."""
-    size = float(np.linalg.norm(turn))
-    return turn * ((2 - size) / size) if size > VECTOR_LENGTH_MIN else np.array([2.0, 0.0])
+    ``D`` (k, 4, 4) are the poses of the second frames in the first. Residuals are along the wrenches that a joint
+    transmits. Angles are those of the smallest rotation that brings the second frame where the joint allows it to be.
+    """
+    R, p = D[:, :3, :3], D[:, :3, 3]
+    of = np.repeat(np.arange(len(joints)), [6 - joint.kind.freedoms for joint in joints])
+    wrenches = np.concatenate([np.zeros((0, 6)), *(joint.wrenches for joint in joints)])
+    turns, aligned, wanted = np.zeros_like(p), list[int](), list[Array]()
+    for number, joint in enumerate(joints):
+        if joint.kind is JointType.UNIVERSAL:
+            wanted.append(find_perpendicular(joint.axes[0], R[number] @ joint.axes[1]))
+            wrenches[np.searchsorted(of, number, "right") - 1, 3:] = cross(joint.axes[0], wanted[-1])
+        elif joint.kind in (JointType.REVOLUTE, JointType.CYLINDRICAL, JointType.PLANAR):
+            wanted.append(joint.axes[0])
+        elif joint.kind in (JointType.PRISMATIC, JointType.FIXED):
+            turns[number] = convert_rotations_to_vectors(R[number])
+        aligned += [number] * (len(wanted) - len(aligned))
+    if aligned:
+        axes = np.array([joints[number].axes[-1] for number in aligned])
+        turns[aligned] = find_smallest_rotations(np.array(wanted), (R[aligned] @ axes[..., None])[..., 0])
+    forces, couples = wrenches[:, :3], wrenches[:, 3:]
+    moments = couples + cross(p[of], forces)
+    return np.sum(forces * p[of] + couples * turns[of], axis=1), np.hstack([forces, moments]), of
 
 
 def compute_closure_residual(joint: JointSpec, X_P: Array, X_S: Array, length: float) -> float:
-    """Return the closure residual of a loop: the larger of the distance (divided by ``length``) and the angle (rad)."""
-    gap, turn, _ = _compute_misses(joint, X_P, X_S)
-    angle = float(np.linalg.norm(turn))
-    if joint.kind is JointType.UNIVERSAL:
-        angle = float(np.arcsin(min(angle, 1.0))) if angle > DIRECTION_SINE_TOL else 0.0
-    elif joint.kind not in (JointType.PRISMATIC, JointType.FIXED):
-        angle = float(np.arcsin(angle)) if angle <= 1 else float(np.pi - np.arcsin(2 - angle))
-    return max(float(np.linalg.norm(gap)) / length, angle)
+    """Return the closure residual of two frames: the larger of the distance (divided by ``length``) and the angle
+    (rad)."""
+    errors, rows, _ = compute_closure_errors([joint], (invert_pose(X_P) @ X_S)[None])
+    forces = rows[:, :3].any(axis=1)
+    return max(float(np.linalg.norm(errors[forces])) / length, float(np.linalg.norm(errors[~forces])))
 
 
 def require_closed(robot: str, loops: Sequence[tuple[JointSpec, Array, Array]], length: float) -> None:

@@ -52,8 +52,7 @@ def find_keyframe(graph: JointGraph, wanted: str) -> Posture:
     if wanted in graph.postures or wanted == STAY:
         return graph.postures.get(wanted, {})
     stated, _, name = wanted.rpartition(":")
-    files = [Path(stated)] if stated.endswith(SRDF) else _list_srdf_files(Path(graph.file))
-    states = {key: state for file in files for key, state in _group_states(file).items()}
+    states = _group_states(Path(stated)) if stated.endswith(SRDF) else _list_states(graph)
     name = name if stated.endswith(SRDF) else wanted
     if name not in states:
         known = [*graph.postures, *states]
@@ -65,10 +64,16 @@ def find_keyframe(graph: JointGraph, wanted: str) -> Posture:
     return _read_group_state(graph, name, states[name])
 
 
-def _list_srdf_files(path: Path) -> list[Path]:
-    """Return the SRDF files that belong to a robot file by folder and name."""
+def list_keyframes(graph: JointGraph) -> list[str]:
+    """Return the names of the keyframes of a file and of the SRDF file next to it."""
+    return [*graph.postures, *_list_states(graph)]
+
+
+def _list_states(graph: JointGraph) -> dict[str, xml.Element]:
+    """Return the group states of the SRDF file that belongs to a robot file by folder and name."""
+    path = Path(graph.file)
     places = path.with_suffix(SRDF), path.parent.parent / "srdf" / (path.stem + SRDF)
-    return [place for place in places if place.is_file()][:1]
+    return next((_group_states(place) for place in places if place.is_file()), {})
 
 
 def _group_states(path: Path) -> dict[str, xml.Element]:

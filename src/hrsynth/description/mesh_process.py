@@ -10,8 +10,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from hrsynth.budgets import PROCESS_BYTES
-from hrsynth.untrusted import find_packing_defect, refuse
+from hrsynth.untrusted import PROCESS_BYTES, find_packing_defect, refuse
 
 
 class Beside:

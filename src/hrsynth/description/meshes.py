@@ -18,46 +18,50 @@ from typing import Any
 
 import numpy as np
 
-from ..budgets import MESH_FILES_MAX, MESH_FILES_MAX_BYTES, MESH_SECONDS, ROBOT_FILE_MAX_BYTES
 from ..errors import BadRequest, HrsynthError
 from ..geometry.vectors import Array
 from ..mechanism.model import Mechanism, Note
+from ..tolerances import MESH_SECONDS, ROBOT_FILE_MAX_BYTES
 from ..untrusted import run_program
 from . import xml
+from .formats.urdf.xacro_process import has_manifest, list_installed_packages
 from .jointgraph import join_names
+
+MESH_FILES_MAX = 2000
+"""Largest number of mesh files copied with a robot."""
+MESH_FILES_MAX_BYTES = 500_000_000
+"""Largest total size of these mesh files (bytes)."""
 
 KNOWN = (".stl", ".obj", ".dae", ".ply", ".off", ".msh", ".glb", ".gltf", ".3mf", ".wrl", ".usd", ".usda", ".usdc")
 """Extensions of meshes: no other file is read or copied."""
-MANIFESTS = ("package.xml", "model.config")
-"""Manifest files of a package of ROS or a model of Gazebo."""
 PROCESS = Path(__file__).with_name("mesh_process.py")
 
 
 def locate_mesh(name: str, folder: Path) -> Path | None:
-    """Return the file of a mesh's address: next to the robot file, or of a package in a folder above it; None if it
-    does not exist, or lies outside of the robot's folders, links followed."""
-    return next(
-        (path for path in _list_candidates(name, folder) if _is_in_robot_folders(path.resolve(), folder.resolve())),
-        None,
-    )
+    """Return the file of a mesh's address: next to the robot file, of a package in a folder above it, or of one that is
+    installed; None if it does not exist, or lies outside of the robot's folders and that package, links followed."""
+    for path in _list_candidates(name, folder):
+        if _is_in_robot_folders(path.resolve(), folder.resolve()):
+            return path
+    package, _, rest = name.removeprefix("package://").partition("/")
+    for home in list_installed_packages(package) if name.startswith("package://") else ():
+        if (home / rest).is_file() and (home / rest).resolve().is_relative_to(home.resolve()):
+            return home / rest
+    return None
 
 
 def _is_in_robot_folders(path: Path, folder: Path) -> bool:
     """Return True if a file lies in the folders of a robot: its package (the nearest folder with a manifest) and
     packages next to it; without one the folder above that of the robot's file, or only that if the one above is the
     user's or holds everything."""
-    package = next((each for each in (folder, *folder.parents) if _is_package(each)), None)
+    package = next((each for each in (folder, *folder.parents) if has_manifest(each)), None)
     if package is None:
         home = Path.home().resolve()
         wide = folder.parent in (Path(folder.anchor), home, home.parent)
         return path.is_relative_to(folder if wide else folder.parent)
     if path.is_relative_to(package) or not path.is_relative_to(package.parent):
         return path.is_relative_to(package)
-    return _is_package(package.parent / path.relative_to(package.parent).parts[0])
-
-
-def _is_package(folder: Path) -> bool:
-    return any((folder / name).is_file() for name in MANIFESTS)
+    return has_manifest(package.parent / path.relative_to(package.parent).parts[0])
 
 
 def _list_candidates(name: str, folder: Path) -> Iterator[Path]:

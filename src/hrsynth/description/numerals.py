@@ -14,16 +14,23 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..budgets import (
-    FILE_NUMBER_MAX,
-    ROUNDED_DECIMALS_MAX,
-    ROUNDED_DECIMALS_MIN,
-    ROUNDED_NUMBERS_MIN_COUNT,
-    SURELY_ROUNDED_DECIMALS_MIN,
-)
 from ..geometry.vectors import Array, build_pose, convert_rpy_to_rotation, rotate_about_axis
-from ..tolerances import EXACT_INCIDENCE_TOL, ROUNDED_UNIT_VECTOR_TOL
+from ..tolerances import EXACT_INCIDENCE_TOL, GEOMETRY_DIFFERENCE_TOL, TOLERANCE_AMBIGUITY_FRACTION
 
+ROUNDED_UNIT_VECTOR_TOL = 2e-3
+"""Largest deviation of a rounded unit vector's length, or of an angle (rad) from a simple one."""
+FILE_NUMBER_MAX = 1e9
+"""Largest magnitude of a number that a robot file may hold (metres, radians)."""
+ROUNDED_DECIMALS_MIN = 3
+"""Decimals from which a file's numbers can be rounded; with fewer they are typed."""
+ROUNDED_NUMBERS_MIN_COUNT = 5
+"""Number of such numbers that shows the rounding of a file."""
+SURELY_ROUNDED_DECIMALS_MIN = 4
+"""Decimals from which numbers are rounded in any case."""
+ROUNDED_DECIMALS_MAX = 11
+"""Decimals up to which numbers can be rounded."""
+ROUNDED_INCIDENCE_FRACTION = 2.5
+"""Deviation of special geometry in units of the last decimal of a file's numbers."""
 ANGLE_DECIMALS_COUNT = 13
 """Decimals of angles and of the components of axes."""
 
@@ -72,6 +79,18 @@ class Digits:
             decimals = full[0]
         self.rounded |= decimals >= SURELY_ROUNDED_DECIMALS_MIN
         return 10.0**-decimals if decimals <= ROUNDED_DECIMALS_MAX else 0.0
+
+    def deviation(self, length: float = 1.0) -> float:
+        """Return the rounding error of exact geometry due to the decimals of the file (characteristic lengths, rad);
+        ``length`` is the characteristic length in the file's unit."""
+        return ROUNDED_INCIDENCE_FRACTION * self.last_place * max(1.0, 1 / length)
+
+    def rounding(self, length: float, opening: float) -> float:
+        """Return that rounding error; 0 if nothing indicates rounding: neither vectors and angles nor the closure
+        residual at zero."""
+        most = self.deviation(length)
+        shown = GEOMETRY_DIFFERENCE_TOL < opening <= TOLERANCE_AMBIGUITY_FRACTION * most
+        return most if self.rounded or shown else 0.0
 
 
 def parse(text: str, count: int) -> Array:

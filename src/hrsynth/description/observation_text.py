@@ -118,7 +118,7 @@ def _find_camera_name(mechanism: Mechanism, seen: Observation) -> str | None:
     for camera in mechanism.cameras:
         if camera.link == seen.seen_from:
             return camera.name
-    raise BadRequest(f"{seen.kind} {seen.leg!r} is seen from a link without a named camera", seen.seen_from)
+    raise BadRequest(f"{seen.text} is seen from a link without a named camera", seen.seen_from)
 
 
 def parse_sensor(text: str, cameras: Sequence[str]) -> ObservationSpec:

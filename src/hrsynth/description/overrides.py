@@ -3,37 +3,41 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from numbers import Real
 
 import numpy as np
 
 from ..errors import BadRequest
-from ..geometry.vectors import build_pose, freeze_array
+from ..geometry.so3 import convert_vectors_to_rotations, find_smallest_rotations
+from ..geometry.vectors import Array, build_pose, freeze_array, invert_pose, normalise_vector
 from ..mechanism.legs import decompose
 from ..mechanism.model import JointType, Mechanism, Motor
 from ..mechanism.normal import reduce_to_normal_form
 from ..mechanism.sensors import observe_segment
-from ..tolerances import EXACT_INCIDENCE_TOL, INCIDENCE_TOL_MAX
+from ..tolerances import EXACT_INCIDENCE_TOL, INCIDENCE_TOL_MAX, VECTOR_LENGTH_MIN
 from . import numerals
 from .contents import scale_shapes
-from .jointgraph import LOOP_TYPES, FrameSpec, JointGraph, join_names
+from .jointgraph import LOOP_TYPES, FrameSpec, JointGraph, build_spanning_tree, compute_zero_poses, join_names
 
 CLOSURES = {"3d": JointType.SPHERICAL, "6d": JointType.FIXED, **LOOP_TYPES}
 UNITS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254}
 """Units of length (m)."""
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_END = rf"(?:[^:,@]|::)+(?:@{_NUMBER},{_NUMBER},{_NUMBER})?"
-_CLOSURE = re.compile(rf"(?P<one>{_END}):(?P<two>{_END})(?::(?P<kind>\w+))?", re.ASCII)
+_VECTOR = rf"{_NUMBER},{_NUMBER},{_NUMBER}"
+_END = rf"(?:[^:,@]|::)+(?:@{_VECTOR})?"
+_KIND = rf"(?::(?P<kind>\w+)(?P<axes>(?:/{_VECTOR})*))?"
+_CLOSURE = re.compile(rf"(?P<one>{_END}):(?P<two>{_END}){_KIND}", re.ASCII)
 
 
 @dataclass(frozen=True)
 class Overrides:
-    """Overrides of a robot file: base, platform, joints of motors, closures ``A:B[:type]`` (A, B links, or points
-    ``A@x,y,z`` in them), joints to freeze, links to observe, the keyframe that is the zero configuration, the unit of
-    the file's lengths; None or empty if the file (or an assumption) decides. Relations of joints up to ``tolerance``
-    are made exact; with ``as_written`` none is."""
+    """Overrides of a robot file: base, platform, joints of motors, closures ``A:B[:type[/axis]]`` (A, B links or
+    frames, or points ``A@x,y,z`` in them), joints to freeze, links to observe, the keyframe that is the zero
+    configuration, the unit of the file's lengths, arguments ``name:=value`` of a xacro file, one of several models;
+    None or empty if the file (or an assumption) decides. Relations of joints up to ``tolerance`` are made exact; with
+    ``as_written`` none is."""
 
     base: str | None = None
     platform: str | None = None
@@ -45,6 +49,8 @@ class Overrides:
     unit: str | None = None
     tolerance: float | None = None
     as_written: bool = False
+    args: tuple[str, ...] = ()
+    model: str | None = None
 
     @classmethod
     def said(
@@ -56,6 +62,7 @@ class Overrides:
         observe: str | Iterable[str] | None = None,
         tolerance: float | None = None,
         as_written: bool = False,
+        args: Mapping[str, object] | str | Iterable[str] | None = (),
         **more: str | None,
     ) -> Overrides:
         """Return the overrides of these options; lists may be texts with commas."""
@@ -78,6 +85,7 @@ class Overrides:
             observe=parse_names(observe),
             tolerance=tolerance,
             as_written=as_written,
+            args=parse_arguments(args or ()),
             **more,
         )
 
@@ -89,15 +97,15 @@ class Overrides:
         )
 
     @property
+    def ends(self) -> set[str]:
+        """Links and frames at the ends of closures."""
+        matches = filter(None, map(_CLOSURE.fullmatch, self.close))
+        return {match[end].partition("@")[0] for match in matches for end in ("one", "two")}
+
+    @property
     def named(self) -> tuple[set[str | None], set[str]]:
         """Links and joints that are named."""
-        ends = [
-            match[end].partition("@")[0]
-            for each in self.close
-            if (match := _CLOSURE.fullmatch(each))
-            for end in ("one", "two")
-        ]
-        return {self.base, self.platform, *(self.observe or ()), *ends}, {*(self.motors or ()), *self.freeze}
+        return {self.base, self.platform, *(self.observe or ()), *self.ends}, {*(self.motors or ()), *self.freeze}
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -105,9 +113,9 @@ class Overrides:
         found: list[str] = []
         for each in fields(self):
             value, flag = getattr(self, each.name), f"--{each.name.replace('_', '-')}"
-            if each.name == "close":
-                found += [word for closure in value for word in (flag, closure)]
-            elif each.name != "observe" and value not in (None, (), False):
+            if each.name in ("close", "args"):
+                found += [word for text in value for word in (flag.removesuffix("s"), text)]
+            elif each.name != "observe" and (value if isinstance(value, tuple | bool) else value is not None):
                 words = [",".join(value) if isinstance(value, tuple) else str(value)]
                 found += [flag, *([] if value is True else words)]
         return tuple(found)
@@ -141,12 +149,27 @@ def parse_names(value: str | Iterable[str] | None) -> tuple[str, ...] | None:
     return tuple(name.strip() for name in parts)
 
 
+def parse_arguments(value: Mapping[str, object] | str | Iterable[str]) -> tuple[str, ...]:
+    """Return arguments of a xacro file as texts ``name:=value``, given as such or as a mapping."""
+    if isinstance(value, Mapping):
+        texts = {name: str(item).lower() if isinstance(item, bool) else str(item) for name, item in value.items()}
+        value = [f"{name}:={text}" for name, text in texts.items()]
+    wanted = (value,) if isinstance(value, str) else tuple(value)
+    for text in wanted:
+        if not isinstance(text, str) or not re.fullmatch(r"[\w.-]+:=.*", text, re.DOTALL) or "\0" in text:
+            raise BadRequest("--arg", text, "NAME:=VALUE, as for xacro")
+    return wanted
+
+
 def parse_closures(value: str | Iterable[str]) -> tuple[str, ...]:
-    """Return a list of closures, given as such or as one text with commas; points have commas of their own."""
+    """Return a list of closures, given as such or as one text with commas; points and axes have commas of their own.
+    A closure may be a number with a type, for a pair of a numbered list."""
     if not isinstance(value, str):
         return parse_names(value) or ()
-    whole = re.fullmatch(rf"\s*{_CLOSURE.pattern}(?:\s*,\s*{_CLOSURE.pattern.replace('?P<', '?P<_')})*\s*", value)
-    return tuple(match[0].strip() for match in _CLOSURE.finditer(value)) if whole else parse_names(value) or ()
+    closure = re.sub(r"\?P<\w+>", "", rf"(?:\d+{_KIND}(?=\s*(?:,|$))|{_CLOSURE.pattern})")
+    if re.fullmatch(rf"\s*{closure}(?:\s*,\s*{closure})*\s*", value, re.ASCII):
+        return tuple(match[0].strip() for match in re.finditer(closure, value, re.ASCII))
+    return parse_names(value) or ()
 
 
 def _freeze(graph: JointGraph, name: str) -> None:
@@ -168,38 +191,70 @@ def _freeze(graph: JointGraph, name: str) -> None:
 
 
 def _close(graph: JointGraph, wish: str) -> None:
-    """Add a closure ``A:B[:type]``: the frames of links A and B, or those frames shifted to points ``A@x,y,z``, meet in
-    all directions that the type does not leave free (its axis is the z axis of A's frame); without a type in a point.
-    It replaces closures of the file between the same two frames."""
+    """Add a closure ``A:B[:type[/axis]]``: the frames of links A and B (or frames of the file), or those frames shifted
+    to points ``A@x,y,z``, meet in all directions that the type does not leave free; without a type in a point. It
+    replaces closures of the file between the same two frames."""
     match = _CLOSURE.fullmatch(wish)
     kind = None if match is None else CLOSURES.get(match["kind"] or "spherical")
-    if match is None or kind is None or kind is JointType.UNIVERSAL:
+    if match is None or kind is None:
         raise BadRequest(
             "--close",
             wish,
-            "A:B or A:B:TYPE, A and B links or points A@x,y,z in them (metres), TYPE one "
-            "of " + ", ".join(name for name in CLOSURES if name != "universal"),
+            "A:B or A:B:TYPE or A:B:TYPE/x,y,z, A and B links, frames or points A@x,y,z in them (metres), x,y,z the "
+            "axis in A's frame, TYPE one of " + ", ".join(CLOSURES),
         )
-    ends = []
-    for end in (match["one"], match["two"]):
-        link, at, point = end.partition("@")
-        if link not in graph.links:
-            raise BadRequest("--close: no such link", link, join_names(graph.links, like=link))
-        try:
-            ends.append(
-                FrameSpec(link, freeze_array(build_pose(numerals.parse(point.replace(",", " "), 3))))
-                if at
-                else FrameSpec(link)
-            )
-        except ValueError as error:
-            raise BadRequest("--close: point", end, str(error)) from None
-    one, two = ends
+    one, two = _find_end(graph, match["one"]), _find_end(graph, match["two"])
     if one.link == two.link:
         raise BadRequest("--close: both ends are on one link", wish, "two links")
+    axes = [_parse_vector(text, "axis") for text in match["axes"].split("/")[1:]] if match["axes"] else []
+    two, axes = _place_axes(graph, wish, kind, (one, two), axes)
     for name, joint in list(graph.joints.items()):
         if not joint.in_tree and _is_same_closure(joint.ends, (one, two)):
             del graph.joints[name]
-    graph.close(graph.fresh(f"close_{one.link}_{two.link}"), kind, (one, two))
+    graph.close(graph.fresh(f"close_{one.link}_{two.link}"), kind, (one, two), axes)
+
+
+def _find_end(graph: JointGraph, text: str) -> FrameSpec:
+    """Return the end of a given closure: a link, or a frame of the file, perhaps shifted to a point in it."""
+    name, is_point, point = text.partition("@")
+    end = FrameSpec(name) if name in graph.links else graph.frames.get(name)
+    if end is None or end.link not in graph.links:
+        raise BadRequest("--close: no such link or frame", name, join_names([*graph.links, *graph.frames], like=name))
+    X = end.X @ build_pose(_parse_vector(point, "point")) if is_point else end.X
+    return FrameSpec(end.link, freeze_array(X))
+
+
+def _parse_vector(text: str, what: str) -> Array:
+    try:
+        return numerals.parse(text.replace(",", " "), 3)
+    except ValueError as error:
+        raise BadRequest(f"--close: {what}", text, str(error)) from None
+
+
+def _place_axes(
+    graph: JointGraph, wish: str, kind: JointType, ends: tuple[FrameSpec, FrameSpec], axes: list[Array]
+) -> tuple[FrameSpec, list[Array]]:
+    """Return B's end and the unit axes. One axis is given in A's frame, and B has it where the file's zero puts it; a
+    second one is given in B's frame."""
+    first, second = ends
+    if not 1 <= len(axes) <= 2 if kind.axes == 1 else len(axes) != kind.axes:
+        ask = (
+            f"TYPE/x,y,z, the axis in {first.link}'s frame (and /x,y,z in {second.link}'s if zero leaves it open)",
+            "TYPE/x,y,z/x,y,z, an axis in each frame",
+        )
+        expected = ask[kind.axes - 1].replace("TYPE", kind.name.lower()) if kind.axes else "no axis for this type"
+        raise BadRequest(f"--close {wish}: axes", len(axes), expected)
+    if not all(np.linalg.norm(axis) > VECTOR_LENGTH_MIN for axis in axes):
+        raise BadRequest("--close: axis", wish, "a non-zero vector")
+    axes = [normalise_vector(axis) for axis in axes]
+    if kind.axes != 1:
+        return second, axes
+    tree = build_spanning_tree(str(first.link), (joint for joint in graph.joints.values() if joint.in_tree))
+    poses = compute_zero_poses(str(first.link), tree)
+    R = (invert_pose(poses[str(second.link)]) @ first.X if second.link in poses else second.X)[:3, :3]
+    if len(axes) == 2:
+        R = convert_vectors_to_rotations(find_smallest_rotations(R @ axes[0], second.X[:3, :3] @ axes[1])) @ R
+    return FrameSpec(second.link, freeze_array(build_pose(second.X[:3, 3], R))), axes[:1]
 
 
 def _is_same_closure(ends: tuple[FrameSpec, FrameSpec], others: tuple[FrameSpec, FrameSpec]) -> bool:

@@ -8,17 +8,17 @@ from hashlib import sha256
 from itertools import islice
 from pathlib import Path
 
-from ..budgets import CHARACTERISTIC_LENGTH_MAX_M, FOREIGN_FILE_LINKS_MAX
-from ..errors import LoopClosureFailure
 from ..mechanism.model import Mechanism, Note
 from ..mechanism.part import extract_between
+from ..tolerances import CHARACTERISTIC_LENGTH_MAX_M
 from . import formats, xml
 from .file_format import RobotFile
 from .formats.urdf import xacro
-from .jointgraph import JointGraph
-from .jointmotion import propose_closure_fix
 from .overrides import Overrides, observe_links
 from .tree import build_spanning_mechanism
+
+FOREIGN_FILE_LINKS_MAX = 1000
+"""Links above which a foreign file is refused."""
 
 AS_IT_IS = Overrides()
 """Overrides without any option."""
@@ -36,26 +36,22 @@ def read(path: Path, overrides: Overrides) -> Mechanism:
 
 def build_mechanism(file: RobotFile, overrides: Overrides) -> Mechanism:
     """Return the mechanism of an opened file; raises like :func:`read`."""
-    try:
-        robot = formats.read(file)
-    except LoopClosureFailure as error:
-        if file.as_written or not file.strict or not propose_closure_fix(error.residual):
-            raise
-        robot = formats.read(replace(file, strict=False))  # rounded: closed as files of other tools are
-    if isinstance(robot, JointGraph):
-        if len(robot.links) > FOREIGN_FILE_LINKS_MAX or len(robot.joints) > 2 * FOREIGN_FILE_LINKS_MAX:
-            raise xml.make_file_error(
-                file.path,
-                "too many links or joints",
-                f"up to {FOREIGN_FILE_LINKS_MAX} links",
-                value=f"{len(robot.links)} links and {len(robot.joints)} joints",
-            )
-        from .assembly.build import build
-        from .assembly.generic import with_generic_zero
+    from .assembly.assemble import assemble
 
-        robot = _restrict_to_part(build(robot, overrides), overrides)
-        return robot if overrides.keyframe is not None or robot.has_open_platform else with_generic_zero(robot)
-    return _restrict_to_part(robot, overrides)
+    graph = formats.read(file)
+    if len(graph.links) > FOREIGN_FILE_LINKS_MAX or len(graph.joints) > 2 * FOREIGN_FILE_LINKS_MAX:
+        raise xml.make_file_error(
+            file.path,
+            "too many links or joints",
+            f"at most {FOREIGN_FILE_LINKS_MAX} links and {2 * FOREIGN_FILE_LINKS_MAX} joints",
+            value=f"{len(graph.links)} links and {len(graph.joints)} joints",
+        )
+    robot = _restrict_to_part(assemble(graph, overrides), overrides)
+    if graph.is_complete or overrides.keyframe is not None or robot.has_open_platform:
+        return robot
+    from .assembly.generic import with_generic_zero
+
+    return with_generic_zero(robot)
 
 
 def _restrict_to_part(robot: Mechanism, overrides: Overrides) -> Mechanism:
@@ -76,35 +72,31 @@ def open_robot_file(path: Path, given: Overrides = AS_IT_IS, *, strict: bool | N
     if os.path.isdir(path):
         path = _find_in_folder(path)
     data = xml.read_bytes(path)
-    if data.startswith(tuple(each for dialect in formats.list_formats().values() for each in dialect.begins)):
-        return RobotFile(path, None, strict, data[:8])
-    if path.suffix.lower() in (".yaml", ".yml") and not data.lstrip().startswith(b"<"):
-        return RobotFile(path, None, strict, tolerance=given.tolerance, as_written=given.as_written)
+    opened = RobotFile(path, None, strict, data, model=given.model)
+    is_yaml = path.suffix.lower() in (".yaml", ".yml")
+    if not xml.may_be_document(data) and (is_yaml or formats.recognise(opened) is not None):
+        return opened
     notes: list[Note] = []
     root = xml.parse_document(data, str(path), notes)
     _require_few(path, root)
-    return RobotFile(
-        path,
-        xacro.expand(path) if xacro.is_needed(root) else root,
-        strict,
-        b"",
-        tuple(notes),
-        given.tolerance,
-        given.as_written,
-    )
+    arguments: dict[str, str] = {}
+    if xacro.is_needed(root):
+        root, arguments = xacro.expand(path, given.args, notes)
+    elif given.args:
+        notes.append(Note("ignored", f"--arg {given.args[0]}: the file is not a xacro file"))
+    return replace(opened, root=root, notes=tuple(notes), arguments=arguments)
 
 
 def _require_few(path: Path, root: xml.Element) -> None:
     """Refuse a file with too many links, joints, keyframes or observations before any of them is read."""
     links, joints = ("link", "body", "model", "default", "frame"), ("joint", "connect", "weld")
     for names, most, what in (
-        (links, 2 * FOREIGN_FILE_LINKS_MAX, "links, bodies and frames"),
-        (joints, 4 * FOREIGN_FILE_LINKS_MAX, "joints"),
-        (("key", "observe"), FOREIGN_FILE_LINKS_MAX, "keyframes and observations"),
+        (links, 2 * FOREIGN_FILE_LINKS_MAX, "link, body, model, default and frame"),
+        (joints, 4 * FOREIGN_FILE_LINKS_MAX, "joint, connect and weld"),
+        (("key", "observe"), FOREIGN_FILE_LINKS_MAX, "key and observe"),
     ):
         if sum(1 for _ in islice(root.iter(*names), most + 1)) > most:
-            allowed = f"{FOREIGN_FILE_LINKS_MAX} links" if names is links else most
-            raise xml.make_file_error(path, f"too many {what}", f"up to {allowed}", value=f"more than {most}")
+            raise xml.make_file_error(path, f"too many {what} elements", f"at most {most}", value=f"more than {most}")
 
 
 def _find_in_folder(path: Path) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import replace
 
 import numpy as np
@@ -12,29 +13,15 @@ from ..mechanism import graphs
 from ..mechanism.model import Joint, JointType, Link, Mechanism
 from . import chains
 
-_COST = {
-    JointType.FREE: 0,
-    JointType.FIXED: 2,
-    JointType.REVOLUTE: 4,
-    JointType.PRISMATIC: 4,
-    JointType.UNIVERSAL: 6,
-    JointType.CYLINDRICAL: 8,
-    JointType.PLANAR: 10,
-    JointType.SPHERICAL: 12,
-}
-"""Cost of a joint of this type in the tree; a free joint closes no loop, so it is never one."""
-_NEW_TREE_JOINT_COST_COUNT = 20
-"""Added to the cost of a joint that was no tree joint before."""
 
-
-def build_spanning_mechanism(mechanism: Mechanism) -> Mechanism:
+def build_spanning_mechanism(mechanism: Mechanism, geared: Container[str] = ()) -> Mechanism:
     """Return the mechanism with a spanning tree of ``in_tree`` joints rooted at the base, each directed away from the
     base.
 
     Unchanged where that holds already. Otherwise the tree is a minimum spanning tree that prefers the tree joints of
-    before, then fixed joints, R and P, U, C, E, S, and actuated joints among equals; links and joints are ordered
-    depth-first from the base, loops last. All geometry is expressed in the base link's frame. Tree joints that a file
-    would hold as one joint, by their names, are that joint.
+    before, then joints with fewer dof, and actuated joints among equals; links and joints are ordered depth-first from
+    the base, loops last. All geometry is expressed in the base link's frame. Tree joints that a file would hold as one
+    joint, by their names, are that joint, unless couplings are to be on some of them (``geared``).
 
     Raises
     ------
@@ -42,7 +29,7 @@ def build_spanning_mechanism(mechanism: Mechanism) -> Mechanism:
         For a link without a joint, or a joint between two links of the tree with six dof.
     """
     mechanism = _move_to_base_frame(mechanism)
-    return chains.merge(mechanism if is_spanning(mechanism) else _cut(mechanism))
+    return chains.merge(mechanism if is_spanning(mechanism) else _cut(mechanism), geared)
 
 
 def _cut(mechanism: Mechanism) -> Mechanism:
@@ -71,16 +58,7 @@ def _cut(mechanism: Mechanism) -> Mechanism:
     for joint in loops.values():
         if joint.type is JointType.FREE:
             raise BadMechanism(f"joint {joint.name!r} closes a loop without constraining it", joint.type.value)
-    carried = {name: joint.successor for name, joint in tree.items()}
-    couplings = tuple(
-        replace(
-            each,
-            predecessor=carried[mechanism.carrier(each, each.predecessor).name],
-            successor=carried[mechanism.carrier(each, each.successor).name],
-        )
-        for each in mechanism.couplings
-    )
-    return replace(mechanism, links=links, joints=tree | loops, couplings=couplings)
+    return replace(mechanism, links=links, joints=tree | loops)
 
 
 def is_spanning(mechanism: Mechanism) -> bool:
@@ -106,10 +84,10 @@ def list_outward_joints(mechanism: Mechanism) -> list[Joint]:
     return [joint for joint, _, _ in graphs.order_outward(mechanism.base, tree)]
 
 
-def _weigh_joint(joint: Joint) -> int:
-    if joint.type is JointType.FREE:
-        return 0
-    return _COST[joint.type] + (not joint.is_actuated) + (0 if joint.in_tree else _NEW_TREE_JOINT_COST_COUNT)
+def _weigh_joint(joint: Joint) -> tuple[bool, bool, int, bool]:
+    """Return the weight of a joint in the tree; a free joint closes no loop, so it is never one."""
+    is_free = joint.type is JointType.FREE
+    return not is_free, not (is_free or joint.in_tree), joint.type.freedoms, not joint.is_actuated
 
 
 def _move_to_base_frame(mechanism: Mechanism) -> Mechanism:

@@ -12,12 +12,15 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from ..budgets import XML_UNKNOWN_NAMES_MAX
 from ..errors import Defect
 from ..mechanism.model import Note
-from ..tolerances import NAME_SIMILARITY_MIN
 from . import xml
 from .file_format import RobotFile
+
+NAME_SIMILARITY_MIN = 0.65
+"""Similarity from which an unknown name in a file counts as a misspelling."""
+XML_UNKNOWN_NAMES_MAX = 300
+"""Different names that a format does not have from which on a document is refused."""
 
 ANY = "..."
 """Entry of a table: an element may hold names of other programs, which are not reported."""

@@ -9,13 +9,15 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...budgets import PLATFORM_GUESS_BODIES_MAX
 from ...errors import BadRequest
 from ...geometry.vectors import Array, invert_pose
 from ...mechanism import graphs
 from ...mechanism.model import JointType, PlatformChoice
 from ...tolerances import DIRECTION_SINE_TOL, POINT_DISTANCE_TOL
-from ..jointgraph import JointGraph, JointSpec, find_first_body
+from ..jointgraph import JointGraph, JointSpec, find_first_body, join_names
+
+PLATFORM_GUESS_BODIES_MAX = 150
+"""Links of a foreign file above which the platform is not assumed from path lengths."""
 
 _WORD = re.compile("[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 _END = re.compile("(.*(foot|hand|flange|gripper|effector|platform))|feet|toe|sole|tool|tcp|eef?")
@@ -28,9 +30,16 @@ _PLATE = re.compile("plat", re.IGNORECASE)
 
 
 def base(graph: JointGraph) -> str:
-    """Return the link that no joint carries, or the first of them in the file."""
+    """Return the file's base, or the link that no joint carries, or the first of them in the file; of links in parts in
+    which nothing moves only if nothing moves in any."""
+    bonds = graphs.build_adjacency(graph.links, (joint.links for joint in graph.joints.values()))
+    moving = {link for joint in graph.joints.values() if joint.kind is not JointType.FIXED for link in joint.links}
+    useful = {link for part in graphs.list_components(bonds) if part & moving for link in part} or {*graph.links}
+    if graph.base in useful:
+        return str(graph.base)
     carried = {joint.links[1] for joint in graph.joints.values() if joint.in_tree}
-    free = [link for link in graph.links if link not in carried] or list(graph.links)
+    movable = [link for link in graph.links if link in useful]
+    free = [link for link in movable if link not in carried] or movable
     if len(free) > 1:
         graph.note(
             "assumption",
@@ -45,6 +54,7 @@ def standing(graph: JointGraph, base: str, wanted: str | None, platform: str | N
     robot on a free joint (``<freejoint>``), or on three prismatic and three revolute joints that position it, the
     floating link; if one prismatic joint carries the robot and the loops begin at its slider, that link: a rail is not
     a leg. ``platform`` is the given one."""
+    _drop_loose_bodies(graph, base, {wanted, platform})
     bonds = graphs.build_adjacency(graph.links, (joint.links for joint in graph.joints.values()))
     if wanted is not None and wanted in graph.links and wanted not in graphs.find_component(bonds, base):
         base = wanted
@@ -60,7 +70,8 @@ def standing(graph: JointGraph, base: str, wanted: str | None, platform: str | N
             break
         (bearer,) = held
         trunk = next(link for link in bearer.links if link != base)
-        if bearer.type is JointType.FREE and (loops or (platform != trunk and _moving(graph, trunk) > 2)):
+        body, moving = _list_body_joints(graph, trunk)
+        if bearer.type is JointType.FREE and (loops or (platform not in body and len(moving) > 2)):
             how = f"floats on the free joint {bearer.name!r}: it is the base; the link below it is left out"
         elif loops and bearer.type is JointType.PRISMATIC and _is_rail(graph, bearer, trunk, platform):
             how = (
@@ -73,6 +84,30 @@ def standing(graph: JointGraph, base: str, wanted: str | None, platform: str | N
         del graph.joints[bearer.name], graph.links[base]
         base = trunk
     return base
+
+
+def _drop_loose_bodies(graph: JointGraph, base: str, named: set[str | None]) -> None:
+    """Remove rigid bodies that only a free joint joins to the base, beside a robot with other joints: they are objects
+    of a scene. Bodies and joints that are named, and joints with motors, stay."""
+    free = {
+        name: joint
+        for name, joint in graph.joints.items()
+        if joint.kind is JointType.FREE and base in joint.links and joint.motor is None
+    }
+    rest = [joint for name, joint in graph.joints.items() if name not in free]
+    bonds = graphs.build_adjacency(graph.links, (joint.links for joint in rest))
+    moving = {link for joint in rest if joint.kind is not JointType.FIXED for link in joint.links}
+    links, joints = graph.named[0] | named, graph.named[1]
+    loose: list[str] = []
+    for name, joint in free.items():
+        body = graphs.find_component(bonds, next(link for link in joint.links if link != base))
+        if moving and name not in joints and not body & (moving | links | {base}):
+            loose += sorted(body, key=list(graph.links).index)
+    if loose:
+        text = f"{len(loose)} links of loose bodies, objects beside the robot (--base or --platform keeps one)"
+        graph.note("ignored", f"{text}: {join_names(loose)}")
+        graph.links = {name: link for name, link in graph.links.items() if name not in loose}
+        graph.joints = {name: joint for name, joint in graph.joints.items() if not {*loose} & {*joint.links}}
 
 
 def _without_float(graph: JointGraph, base: str, named: set[str | None]) -> str:
@@ -97,7 +132,7 @@ def _without_float(graph: JointGraph, base: str, named: set[str | None]) -> str:
     geared = {name for gear in graph.gears for name in (gear.driver, gear.driven)}
     if (
         sorted(kinds) != list("PPPRRR")
-        or _moving(graph, link) < 3
+        or len(_list_body_joints(graph, link)[1]) < 3
         or graph.platform in left
         or named & left
         or any(each.motor is not None or each.name in geared for each in chain)
@@ -118,9 +153,12 @@ def _without_float(graph: JointGraph, base: str, named: set[str | None]) -> str:
     return link
 
 
-def _moving(graph: JointGraph, link: str) -> int:
-    """Return the number of joints of a link that are not fixed."""
-    return sum(link in joint.links and joint.kind is not JointType.FIXED for joint in graph.joints.values())
+def _list_body_joints(graph: JointGraph, link: str) -> tuple[set[str], list[JointSpec]]:
+    """Return the rigid body of a link, and the joints on it that are not fixed."""
+    joints = graph.joints.values()
+    bonds = graphs.build_adjacency(graph.links, (joint.links for joint in joints if joint.kind is JointType.FIXED))
+    body = graphs.find_component(bonds, link)
+    return body, [joint for joint in joints if joint.kind is not JointType.FIXED and body & {*joint.links}]
 
 
 def _is_rail(graph: JointGraph, slide: JointSpec, trunk: str, platform: str | None) -> bool:
@@ -141,8 +179,8 @@ def _is_rail(graph: JointGraph, slide: JointSpec, trunk: str, platform: str | No
 
 def formation(graph: JointGraph, base: str) -> str | None:
     """Return the first body of a formation, None if there is no formation; record it in the graph."""
-    told = [*(each.link for each in graph.sights), *(each.link for each in graph.cameras)]
-    found, _ = find_first_body(graph.links, (joint.links for joint in graph.joints.values()), base, told)
+    pairs = (joint.links for joint in graph.joints.values())
+    found, _ = find_first_body(graph.links, pairs, base, graph.watched)
     graph.formation = found is not None
     return found
 

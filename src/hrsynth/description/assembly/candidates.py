@@ -7,14 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...budgets import CLOSURE_CANDIDATES_MAX
 from ...geometry.vectors import Array
 from ...mechanism import graphs
 from ...mechanism.model import JointType
-from ...tolerances import CLOSURE_CANDIDATE_DISTANCE_MAX, INCIDENCE_TOL
+from ...tolerances import INCIDENCE_TOL
 from ..jointgraph import JointGraph, join_names
-from ..jointmotion import get_zero_value, step_along
-from .loops import LoopAssembly
+from .loops import LoopAssembly, Values
+
+CLOSURE_CANDIDATE_DISTANCE_MAX = 2e-2
+"""Distance (characteristic lengths) up to which two frames of a foreign file are candidates for a closure."""
+CLOSURE_CANDIDATES_MAX = 12
+"""Largest number of frame pairs reported as possible closures."""
 
 
 @dataclass(frozen=True)
@@ -40,16 +43,19 @@ def closure_candidates(graph: JointGraph, base: str) -> tuple[ClosureCandidate, 
     same two bodies at the same point the frame on a fixed joint."""
     joints = [joint for joint in graph.joints.values() if joint.in_tree]
     assembly = LoopAssembly(base, joints)
-    at_zero = assembly.poses(assembly.zero())
-    links = list(at_zero)
+    links = [base, *(link for _, _, link in assembly.tree)]
     if len(links) < 2:
         return ()
     bonds = graphs.build_adjacency(
-        links, (j.links for j in joints if j.type is JointType.FIXED and j.links[0] in at_zero)
+        links, (j.links for j in joints if j.type is JointType.FIXED and j.links[0] in links)
     )
     body = {link: number for number, group in enumerate(graphs.list_components(bonds)) for link in group}
-    joined = {frozenset(body[x] for x in j.links) for j in graph.joints.values() if set(j.links) <= set(at_zero)}
-    points, moved = (_points(assembly, links, values) for values in (assembly.zero(), _move_joints(assembly)))
+    joined = {frozenset(body[x] for x in j.links) for j in graph.joints.values() if set(j.links) <= set(links)}
+    zero, step = assembly.zero(), np.random.default_rng(0).uniform(0.4, 1.0, assembly.model.nv)
+    size = assembly.size
+    points, moved = (
+        _points(assembly, links, values) for values in (zero, assembly.step(zero, step[:size], step[size:]))
+    )
     apart = np.linalg.norm(points[:, None] - points, axis=2) / assembly.length
     apart_moved = np.linalg.norm(moved[:, None] - moved, axis=2) / assembly.length
     # near at zero, and farther apart elsewhere: joints that rotate about the point itself do not separate frames there
@@ -93,19 +99,13 @@ def without_loop(graph: JointGraph, base: str) -> str | None:
             f"; frames close to each other: {join_names(map(str, found), CLOSURE_CANDIDATES_MAX)} (--close "
             f"{found[0].wish} connects the first two in a point)"
         )
+    if graph.arguments:
+        values = join_names(f"{name}:={value}" for name, value in graph.arguments.items())
+        text += f"; the file has arguments, now {values} (--arg NAME:=VALUE changes one)"
     return text
 
 
-def _points(assembly: LoopAssembly, links: list[str], values: dict[str, Array]) -> Array:
+def _points(assembly: LoopAssembly, links: list[str], values: Values) -> Array:
     """Return the origins of the links' frames, (count, 3), in metres."""
     poses = assembly.poses(values)
     return np.array([poses[link][:3, 3] for link in links])
-
-
-def _move_joints(assembly: LoopAssembly, seed: int = 0) -> dict[str, Array]:
-    """Return random values of all joints."""
-    rng = np.random.default_rng(seed)
-    return {
-        joint.name: step_along(joint, get_zero_value(joint), rng.uniform(0.4, 1.0, joint.kind.freedoms), np.eye(3))
-        for joint, _, _ in assembly.tree
-    }

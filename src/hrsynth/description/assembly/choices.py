@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...errors import BadRequest
-from ...mechanism.model import Mechanism, Note, infer_motors
+from ...mechanism.model import Note, infer_motors
 from .. import formats
 from ..jointgraph import JointGraph, JointSpec
 from ..overrides import Overrides
@@ -51,12 +50,10 @@ def choices(path: Path, overrides: Overrides) -> ImportChoices:
     """Return the open choices of the file at ``path`` once closures, motors and frozen joints are given; raises as
     reading it does."""
     graph = formats.read(open_robot_file(path, overrides, strict=False))
-    if isinstance(graph, Mechanism):
-        raise BadRequest(f"{path}: this format leaves no choice open", graph.name)
     closures.join_halves(graph)
     overrides.apply(graph)
     closures.merge_points(graph)
-    base = assumptions.standing(graph, graph.base or assumptions.base(graph), overrides.base)
+    base = assumptions.standing(graph, assumptions.base(graph), overrides.base)
     graph.prune(base)
     carried = {joint.links[1] for joint in graph.joints.values() if joint.in_tree}
     bases = dict.fromkeys([base, *(link for link in graph.links if link not in carried)])

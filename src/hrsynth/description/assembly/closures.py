@@ -5,22 +5,22 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Set
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
 from ...geometry import lines
 from ...geometry.vectors import Array, build_pose, find_perpendicular, freeze_array, invert_pose, normalise_vector
 from ...mechanism import graphs
-from ...mechanism.model import Joint, JointType, Mechanism, Motor, Note
-from ...tolerances import INCIDENCE_TOL, ROUNDED_INCIDENCE_FRACTION
-from ..chains import CUT, END, SECOND, WHOLES, name_chain_joint
-from ..jointgraph import FrameSpec, JointGraph, JointSpec, Z
+from ...mechanism.model import Joint, JointType, Link, Mechanism, Note
+from ...tolerances import INCIDENCE_TOL
+from ..chains import CUT, END, SECOND, name_chain_joint, recognise_chain
+from ..conversion import convert_to_joint
+from ..jointgraph import FrameSpec, JointGraph, JointSpec, Z, compute_zero_poses
 
 
 def merge_points(graph: JointGraph) -> None:
     """Merge point closures of the same two links: two are a revolute joint through both; three are rigid."""
-    noise = ROUNDED_INCIDENCE_FRACTION * graph.digits.last_place * graph.unit
+    noise = graph.digits.deviation() * graph.unit
     table: dict[frozenset[str], list[JointSpec]] = defaultdict(list)
     for joint in graph.joints.values():
         if joint.type is JointType.SPHERICAL and not joint.in_tree:
@@ -182,7 +182,7 @@ def _join(graph: JointGraph, name: str, bare: Callable[[str], bool], busy: Set[s
         or not all(bare(link) and sum(link in joint.links for joint in graph.joints.values()) == 2 for link in between)
     ):
         return
-    whole = _whole(stem, chain, ROUNDED_INCIDENCE_FRACTION * graph.digits.last_place)
+    whole = _whole(stem, chain, graph.digits.deviation())
     if whole is None:
         return
     here = weld.links.index(name)
@@ -197,32 +197,20 @@ def _join(graph: JointGraph, name: str, bare: Callable[[str], bool], busy: Set[s
 def _whole(name: str, chain: list[JointSpec], noise: float) -> JointSpec | None:
     """Return the joint that equals a chain of joints at one point, to the file's decimals; None if its links, geometry,
     motors or limits do not fit."""
-    first, *others = chain
-    if not others:
+    first, last = chain[0], chain[-1]
+    if last is first:
         return first
-    kind = WHOLES.get("".join(str(joint.type) for joint in chain))
-    if (
-        kind is None
-        or any(a.links[1] != b.links[0] for a, b in pairwise(chain))
-        or any(
-            joint.limits != first.limits or (joint.motor is None) != (first.motor is None) or joint.xml
-            for joint in others
-        )
-    ):
+    base, X = first.links[0], first.ends[0].X
+    poses = compute_zero_poses(base, [(joint, *joint.links) for joint in chain])
+    joints = [convert_to_joint(joint, poses, in_tree=True, is_closed=True) for joint in chain]
+    between = [Link(joint.successor, poses[joint.successor]) for joint in joints[:-1]]
+    whole = recognise_chain(name, joints, between, INCIDENCE_TOL + noise, INCIDENCE_TOL + noise)
+    if whole is None:
         return None
-    frames = [np.eye(4)]
-    for a, b in pairwise(chain):
-        frames.append(frames[-1] @ invert_pose(a.ends[1].X) @ b.ends[0].X)
-    axes = [normalise_vector(X[:3, :3] @ joint.axes[0]) for X, joint in zip(frames, chain, strict=True)]
-    wanted = np.ones((2, 2)) if kind is JointType.CYLINDRICAL else np.eye(len(chain))
-    points = np.array([X[:3, 3] for X in frames])
-    if np.max(np.abs(points)) > INCIDENCE_TOL + noise or np.max(np.abs(np.array(axes) @ np.array(axes).T - wanted)) > (
-        INCIDENCE_TOL + noise
-    ):
-        return None
-    kept = first.axes[:1] + chain[-1].axes[:1] if kind is JointType.UNIVERSAL else tuple(axes[-1:]) * kind.axes
-    motor = first.motor and Motor(first.motor.name.removesuffix("__1"))
-    return replace(first, name=name, type=kind, axes=kept, motor=motor)
+    axes = tuple(X[:3, :3].T @ axis for axis in whole.axes)
+    if whole.type is JointType.UNIVERSAL:
+        axes = axes[0], last.axes[0]
+    return replace(first, name=name, type=whole.type, axes=axes, motor=whole.motor)
 
 
 def _with_end(joint: JointSpec, place: int, link: str, X: Array, line: int | None) -> JointSpec:

@@ -7,7 +7,7 @@ against it. Such a chain is passive and forbids nothing that the legs allow.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -16,6 +16,8 @@ import numpy as np
 from ...mechanism import graphs
 from ...mechanism.model import Joint, JointType, Mechanism, Note
 from ...tolerances import DIRECTION_SINE_TOL, POINT_DISTANCE_TOL
+from ..jointgraph import JointGraph, join_names
+from ..numerals import format_exact
 from ..tree import build_spanning_mechanism, is_connected
 from .loops import LoopAssembly
 
@@ -54,23 +56,39 @@ def without_coordinates(mechanism: Mechanism) -> Mechanism:
 def mobility(mechanism: Mechanism) -> int:
     """Return the mobility at the zero configuration."""
     assembly = LoopAssembly.of(mechanism)
-    return sum(joint.kind.freedoms for joint, _, _ in assembly.tree) - assembly.rank(assembly.zero()).value
+    return assembly.model.nv - assembly.rank(assembly.zero()).value
 
 
-def with_weighed_motors(mechanism: Mechanism) -> Mechanism:
-    """Add a note if more coordinates have motors than the mobility: files put actuators on passive joints too."""
+def _find_locks(mechanism: Mechanism, graph: JointGraph) -> Iterator[Note]:
+    """Yield a note on each closure of a file that locks every joint of its loop, though a point in its place would
+    not."""
+    assembly = LoopAssembly.of(mechanism)
+    still = assembly.find_still_joints(assembly.zero())
+    for spec in graph.joints.values() if still else ():
+        joint = mechanism.joints.get(spec.name)
+        if spec.in_tree or joint is None or joint.type.freedoms >= JointType.SPHERICAL.freedoms:
+            continue
+        point = Joint(joint.name, JointType.SPHERICAL, *joint.links, joint.point, in_tree=False)
+        freer = mechanism.changed(joints=[point])
+        locked = LoopAssembly.of(freer).list_loop_joints(spec.name)
+        if locked and still.issuperset(locked) and mobility(freer) > mobility(mechanism):
+            places = [",".join(map(format_exact, end.X[:3, 3])) if end.X[:3, 3].any() else "" for end in spec.ends]
+            ends = ":".join(f"{end.link}@{at}".removesuffix("@") for end, at in zip(spec.ends, places, strict=True))
+            text = f"the closure {spec.name!r} locks {join_names(locked)}; a point would not (--close {ends})"
+            yield Note("open", text)
+
+
+def with_weighed_motors(mechanism: Mechanism, graph: JointGraph) -> Mechanism:
+    """Add a note if closures lock their loops, or if more coordinates have motors than the mobility: files put
+    actuators on passive joints too."""
+    if all(joint.in_tree for joint in mechanism.joints.values()):
+        return mechanism
+    notes = [*_find_locks(mechanism, graph)]
     driven = sum(joint.type.freedoms for joint in mechanism.joints.values() if joint.is_actuated)
-    if driven == 0 or all(joint.in_tree for joint in mechanism.joints.values()):
-        return mechanism
-    free = mobility(mechanism)
-    if driven <= free:
-        return mechanism
-    note = Note(
-        "open",
-        f"{driven} coordinates have motors, but the mobility is {free}: some motors may be on "
-        "passive joints (--motors JOINTS names the motors)",
-    )
-    return replace(mechanism, notes=(*mechanism.notes, note))
+    if driven and not notes and driven > (free := mobility(mechanism)):
+        text = f"{driven} coordinates have motors, but the mobility is {free}: some motors may be on "
+        notes.append(Note("open", text + "passive joints (--motors JOINTS names the motors)"))
+    return replace(mechanism, notes=(*mechanism.notes, *notes))
 
 
 def _chains(mechanism: Mechanism) -> list[list[Joint]]:
@@ -80,8 +98,7 @@ def _chains(mechanism: Mechanism) -> list[list[Joint]]:
     )
     base, platform = (graphs.find_component(bonds, link) for link in (mechanism.base, mechanism.platform))
     busy = {mechanism.reference, *(o.link for o in mechanism.observations)}
-    busy |= {o.seen_from for o in mechanism.observations if o.seen_from is not None}
-    busy |= {link for c in mechanism.couplings for link in (c.predecessor, c.successor)}
+    busy |= {o.seen_from for o in mechanism.observations if o.seen_from is not None} | mechanism.coupled_links
     found = []
     for start in base:
         for joint in mechanism.joints_of(start):

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...budgets import LOOP_ASSEMBLY_TRIES_MAX, SPECIAL_ZERO_SAMPLES_COUNT
 from ...errors import HrsynthError
 from ...geometry.ranks import Rank, compute_range_basis
 from ...geometry.screws import compute_point_velocity
@@ -23,8 +22,11 @@ from ...mechanism.observations.direction import Direction
 from ...mechanism.sensors import list_default_segments
 from ...tolerances import CLOSURE_SOLVER_TOL, RANK_GAP_MIN
 from ..keyframes import STAY
-from .loops import LoopAssembly, Values
+from .loops import LOOP_ASSEMBLY_TRIES_MAX, LoopAssembly, Values
 from .zero_configuration import moves, with_zero_at
+
+SPECIAL_ZERO_SAMPLES_COUNT = 4
+"""Nearby configurations that must agree before a zero configuration is called special."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,8 @@ def with_generic_zero(mechanism: Mechanism) -> Mechanism:
     if not segments:
         return mechanism
     assembly = LoopAssembly.of(mechanism)
+    if assembly.is_too_large:
+        return mechanism
     zero = assembly.zero()
 
     def ranks(values: Values) -> tuple[_Ranks, bool]:
@@ -130,27 +134,19 @@ def _ranks(
 
 def _nearby(assembly: LoopAssembly, zero: Values, size: float, rng: np.random.Generator) -> Values | None:
     """Return closed values a random step from zero, all joints moved; None if they do not close near the step's end."""
-    kernel = assembly.kernel(zero)
-    step = kernel @ rng.normal(size=kernel.shape[1])
-    step *= size / float(np.max(np.abs(step), initial=1e-12))
-    ahead = assembly.step(zero, step)
+    ahead = assembly.draw(zero, size, rng)
     there, residual = assembly.close(ahead)
     if residual > 10 * CLOSURE_SOLVER_TOL or assembly.apart(ahead, there) > assembly.apart(ahead, zero) / 2:
         return None
-    loose = {joint.name for joint, _, _ in assembly.tree} - {joint.name for joint in assembly.active}
-    return {
-        name: value + size * rng.uniform(-1, 1, value.shape) if name in loose and value.ndim == 1 else value
-        for name, value in there.items()
-    }
+    return assembly.step(there, np.zeros(assembly.size), size * rng.uniform(-1, 1, assembly.model.nv - assembly.size))
 
 
 def _beyond_limits(mechanism: Mechanism, assembly: LoopAssembly, values: Values) -> float:
     """Return the total violation of the limits of one-dof tree joints (m, radians)."""
     total = 0.0
-    for spec, _, _ in assembly.tree:
-        limits = mechanism.joints[spec.name].limits
-        if limits is not None and spec.kind.freedoms == 1:
-            q = float(values[spec.name][0]) * assembly.unit(spec)
+    for name, q in assembly.singles(values).items():
+        limits = mechanism.joints[name].limits
+        if limits is not None:
             total += max(
                 0.0,
                 0.0 if limits.lower is None else limits.lower - q,

@@ -8,6 +8,7 @@ min ‖x − x₀‖ subject to f(x) = 0, by Gauss-Newton on the constraints wit
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,18 +16,17 @@ from itertools import combinations
 
 import numpy as np
 
-from ...budgets import FILE_INCIDENCE_JOINTS_MAX, TOLERANCE_HALVINGS_MAX
-from ...errors import BadMechanism, RoundingLimitedRank, UndecidedRank, UndecidedStructure
-from ...geometry.gauss_newton import DampingFactor, Residual, descend
+from ...errors import BadMechanism, NoResult, RoundingLimitedRank, UndecidedRank, UndecidedStructure
 from ...geometry.ranks import decompose_matrix
 from ...geometry.vectors import Array, normalise_vector
 from ...mechanism.model import JointType, Mechanism, Note
 from ...mechanism.normal import reduce_to_normal_form
 from ...mechanism.observations.direction import SeenAxis
+from ...solving.gauss_newton import DampingFactor, Residual, descend
 from ...tolerances import (
-    AXIS_MEETING_SINE_MIN,
     EXACT_INCIDENCE_TOL,
     GEOMETRY_DIFFERENCE_TOL,
+    INCIDENCE_TOL_MAX,
     RANK_CUTOFF_FRACTION,
     RANK_GAP_MIN,
     TOLERANCE_AMBIGUITY_FRACTION,
@@ -34,7 +34,20 @@ from ...tolerances import (
 from ..jointgraph import join_names
 from ..tree import build_spanning_mechanism
 from .loops import LoopAssembly
-from .relations import Bodies, GeometricRelation, JointCoordinates, certain, of_axes, of_centres
+from .repair_relations import (
+    AXIS_MEETING_SINE_MIN,
+    Bodies,
+    JointCoordinates,
+    RepairRelation,
+    list_axis_relations,
+    list_centre_relations,
+    list_definitions,
+)
+
+TOLERANCE_HALVINGS_MAX = 5
+"""Halvings of the snapping tolerance while relations contradict each other."""
+FILE_INCIDENCE_JOINTS_MAX = 120
+"""Joints of a foreign file above which rounded incidences are not searched."""
 
 CONTRADICTION = "relations that contradict each other"
 DAMPING = DampingFactor(start=1.0, eased=1.0, least=1.0, most=1e2)
@@ -49,7 +62,7 @@ class RepairedGeometry:
     normal: Mechanism | None = None
     x: Array | None = None
     relations: frozenset[tuple[str, tuple[str, ...]]] = frozenset()
-    mended: tuple[GeometricRelation, ...] = ()
+    mended: tuple[RepairRelation, ...] = ()
     shift: float = 0.0
     turn: float = 0.0
 
@@ -69,13 +82,15 @@ class RepairedGeometry:
                 f"{change:.1e}; centres moved by up to {1e3 * self.shift:.2g} mm, axes turned by up to "
                 f"{np.rad2deg(self.turn):.2g} deg; rank gap of the loops as written "
                 f"{gap:.1e} (--tolerance changes this, --as-written keeps the numbers)",
+                count=len(self.mended),
+                change=change,
             )
         ]
         kinds: dict[str, dict[tuple[str, ...], None]] = defaultdict(dict)
         for relation in self.mended:
             kinds[relation.kind][relation.of] = None
         found += [
-            Note("merged", f"made to be {kind}: " + "; ".join(join_names(names, 40) for names in groups))
+            Note("merged", f"made to be {kind}: " + "; ".join(join_names(names, 40) for names in groups), count=0)
             for kind, groups in kinds.items()
         ]
         return found
@@ -125,7 +140,8 @@ def snap_geometry(mechanism: Mechanism, residual: float, tolerance: float, possi
     if rank.gap < RANK_GAP_MIN:
         raise UndecidedRank(f"{mechanism.file}: loops with rounded numbers", rank.gap, RANK_GAP_MIN)
     if firm.value != rank.value:
-        raise RoundingLimitedRank(str(mechanism.file), rank.value - firm.value, residual)
+        wider = _find_wider_tolerance(mechanism, residual, tolerance)
+        raise RoundingLimitedRank(str(mechanism.file), rank.value - firm.value, residual, wider)
     if ideal.mended:
         written = LoopAssembly.of(mechanism)
         gap = written.rank(written.zero(), max(RANK_CUTOFF_FRACTION, TOLERANCE_AMBIGUITY_FRACTION * tolerance)).gap
@@ -141,10 +157,25 @@ def snap_geometry(mechanism: Mechanism, residual: float, tolerance: float, possi
                     f"the loops are open by up to {residual:.2g} (characteristic lengths, radians; "
                     f"{1e3 * residual * mechanism.length:.2g} mm) at zero, within the tolerance of {tolerance:.1g}: "
                     "the joints that close them are centred",
+                    change=residual,
                 )
             ],
         )
     return _idealise_directions(replace(found, notes=(*mechanism.notes, *notes)) if notes else found, tolerance)
+
+
+def _find_wider_tolerance(mechanism: Mechanism, residual: float, tolerance: float) -> float | None:
+    """Return a larger tolerance, a power of ten, at which the rank of the loops is decided; None if there is none."""
+    wider = 10.0 ** (math.floor(math.log10(tolerance) + 1e-9) + 1)
+    if wider > INCIDENCE_TOL_MAX:
+        return None
+    try:
+        snap_geometry(mechanism, residual, wider)
+    except RoundingLimitedRank as refused:
+        return refused.tolerance
+    except NoResult:
+        return _find_wider_tolerance(mechanism, residual, wider)
+    return wider
 
 
 def _idealise_directions(mechanism: Mechanism, tolerance: float) -> Mechanism:
@@ -193,8 +224,8 @@ def nearest(mechanism: Mechanism, tolerance: float, known: RepairedGeometry | No
         return RepairedGeometry(mechanism)
     bodies = Bodies(mechanism)
     at = JointCoordinates(mechanism, bodies, tolerance)
-    always = list(certain(at))
-    held = [*always, *(each for each in of_axes(at, bodies) if each.defect <= tolerance)]
+    always = list(list_definitions(at))
+    held = [*always, *(each for each in list_axis_relations(at, bodies) if each.defect <= tolerance)]
     if known is not None and known.x is not None and known.normal is not None and _names(held) <= known.relations:
         x, normal = known.x, known.normal
     else:
@@ -202,7 +233,7 @@ def nearest(mechanism: Mechanism, tolerance: float, known: RepairedGeometry | No
         if miss > EXACT_INCIDENCE_TOL:
             return None
         normal = reduce_to_normal_form(at.mechanism_of(x)).mechanism
-    held += [each for each in of_centres(at, normal, x) if each.defect <= tolerance]
+    held += [each for each in list_centre_relations(at, normal, x) if each.defect <= tolerance]
     if known is not None and _names(held) == known.relations:
         return known
     x, miss = _project(at, held)
@@ -225,11 +256,11 @@ def nearest(mechanism: Mechanism, tolerance: float, known: RepairedGeometry | No
     )
 
 
-def _names(relations: Sequence[GeometricRelation]) -> set[tuple[str, tuple[str, ...]]]:
+def _names(relations: Sequence[RepairRelation]) -> set[tuple[str, tuple[str, ...]]]:
     return {(each.kind, each.of) for each in relations}
 
 
-def _project(at: JointCoordinates, relations: Sequence[GeometricRelation]) -> tuple[Array, float]:
+def _project(at: JointCoordinates, relations: Sequence[RepairRelation]) -> tuple[Array, float]:
     """Return the nearest coordinates at which all relations hold, and the largest remaining defect; spherical joints
     alone may have no relation."""
     start, weights = at.start, at.scale
@@ -258,7 +289,7 @@ def _project(at: JointCoordinates, relations: Sequence[GeometricRelation]) -> tu
 def _structure(mechanism: Mechanism) -> str:
     """Return the joints of the normal form and the mobility, which distinguish two structures."""
     assembly = LoopAssembly.of(mechanism)
-    free = sum(joint.kind.freedoms for joint, _, _ in assembly.tree) - assembly.rank(assembly.zero()).value
+    free = assembly.model.nv - assembly.rank(assembly.zero()).value
     types = sorted(str(joint.type) for joint in reduce_to_normal_form(mechanism).mechanism.joints.values())
     counts = ", ".join(f"{types.count(each)} {each}" for each in dict.fromkeys(types))
     return f"joints {counts}; mobility {free}"

@@ -1,46 +1,41 @@
 """Closing of the loops of a joint graph: tree joints are moved until the two frames of every other joint meet.
 
-Damped Gauss-Newton on the coordinates of the tree joints that lie in loops. Directions in which the loops hardly
-resist (redundant constraints, disturbed by rounded numbers) are not followed. Lengths in characteristic lengths.
+Pinocchio's model of a spanning tree, with constraints between the frames of the other joints. Damped Gauss-Newton on
+the coordinates of the tree joints that lie in loops. Directions in which the loops hardly resist (redundant
+constraints, disturbed by rounded numbers) are not followed. Lengths in characteristic lengths.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Collection, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
+from numpy.polynomial import Polynomial
+from numpy.typing import NDArray
 
-from ...budgets import (
-    FIRMER_ZERO_MIN_FRACTION,
-    FIXED_JOINT_TRIES_COUNT,
-    LOOP_ASSEMBLY_STEP_MAX,
-    LOOP_ASSEMBLY_TRIES_MAX,
-    LOOP_ASSEMBLY_VISITS_MAX,
-    SINGULAR_STEPS,
-)
-from ...geometry.gauss_newton import DampingFactor, Residual, descend
-from ...geometry.ranks import Rank, decompose_matrix, rank_of
-from ...geometry.so3 import convert_to_quaternions
-from ...geometry.vectors import Array, build_pose, invert_pose, normalise_vector
+from ...geometry.ranks import Rank, decompose_matrix, draw_in_space, rank_of
+from ...geometry.so3 import turn_about
+from ...geometry.vectors import Array, invert_pose, normalise_vector
 from ...mechanism.model import JointType, Mechanism
+from ...mechanism.screws import split_elementary
+from ...solving.gauss_newton import DampingFactor, Residual, descend
 from ...tolerances import (
     CLOSURE_SOLVER_TOL,
+    DIRECTION_SINE_TOL,
     EXACT_INCIDENCE_TOL,
     INCIDENCE_TOL,
-    LIMIT_INSET_MIN,
-    NEARLY_SINGULAR_ZERO_FRACTION,
-    NEWTON_STEP_TO_RESIDUAL_MAX,
+    LOOP_COORDINATES_MAX,
     RANK_CUTOFF_FRACTION,
     RANK_GAP_MIN,
     VECTOR_LENGTH_MIN,
-    WEAK_CONSTRAINT_FRACTION,
 )
+from ..conversion import list_coupling_specs, list_joint_specs
 from ..jointgraph import (
     ORIGIN,
     CouplingSpec,
-    FrameSpec,
     JointSpec,
     Posture,
     TreeJoint,
@@ -48,149 +43,215 @@ from ..jointgraph import (
     compute_zero_poses,
     scale_pose,
 )
-from ..jointmotion import compute_closure_error, compute_joint_pose, compute_joint_screws, get_zero_value, step_along
+from ..jointmotion import compute_closure_errors
+
+WEAK_CONSTRAINT_FRACTION = 1e-3
+"""Relative singular value of a file's loops below which only rounding constrains a direction."""
+LIMIT_INSET_MIN = 0.1
+"""Distance (radians, characteristic lengths) inside its limits at which a joint starts when loops close beyond them."""
+NEARLY_SINGULAR_ZERO_FRACTION = 5e-3
+"""Relative smallest singular value below which a foreign file's zero configuration is replaced."""
+NEWTON_STEP_TO_RESIDUAL_MAX = 1e4
+"""Length of a Newton step in a foreign file's loops, per residual, beyond which it follows rounding."""
+LOOP_ASSEMBLY_STEP_MAX = 0.4
+"""Largest change of a coordinate per step of the loop solver (characteristic lengths, radians)."""
+LOOP_ASSEMBLY_VISITS_MAX = 100_000
+"""Work limit of the loop solver in joint visits (some seconds)."""
+LOOP_ASSEMBLY_TRIES_MAX = 24
+"""Random restarts of the loop solver."""
+FIXED_JOINT_TRIES_COUNT = 4
+"""Restarts with motors, or joints at their limits, locked."""
+SINGULAR_STEPS = (0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0)
+"""Steps (radians, characteristic lengths) that leave a singular zero configuration; the first that does is used."""
+FIRMER_ZERO_MIN_FRACTION = 2.0
+"""Factor by which another configuration must be less singular to replace a nearly singular zero."""
 
 DAMPING = DampingFactor(start=1.0, eased=0.1, least=1e-3, most=1e6)
 SINGLE = (JointType.REVOLUTE, JointType.PRISMATIC)
-Values = dict[str, Array]
-"""Value of every tree joint."""
+_BALLS = (JointType.SPHERICAL, JointType.FREE)
+Values = Array
+"""Configuration (nq,) of Pinocchio's model of the spanning tree."""
 
 
 class LoopAssembly:
-    """Tree, loops and couplings of a joint graph with values of its tree joints; zero may be a keyframe. A closure
-    residual below ``noise`` may be due to rounding."""
+    """Spanning tree of a joint graph as a Pinocchio model, with constraints that close its loops, and couplings.
+
+    Zero may be a keyframe. Lengths inside are characteristic lengths; limits, keyframes and coordinates are in metres.
+    A closure residual below ``noise`` may be due to rounding.
+    """
 
     def __init__(
         self, base: str, joints: Sequence[JointSpec], gears: Sequence[CouplingSpec] = (), start: Posture | None = None
     ) -> None:
-        self.base, self.noise = base, INCIDENCE_TOL
-        self._start = start or {}
-        tree = build_spanning_tree(base, joints)
-        self.length = _spread(base, tree)
-        self.tree = [(_scale(joint, self.length), parent, child) for joint, parent, child in tree]
-        used = {joint.name for joint, _, _ in tree}
-        self._parent = {child: (joint, parent) for joint, parent, child in self.tree}
-        reached = {base, *self._parent}
+        import pinocchio as pin
+
+        self.base, self.noise, self._start, self._pin = base, INCIDENCE_TOL, start or {}, pin
+        self.tree = build_spanning_tree(base, joints)
+        self.length = _spread(base, self.tree)
+        self.model = pin.Model()
+        self._bodies = {base: (0, pin.SE3.Identity())}
+        self._columns: dict[str, NDArray[np.intp]] = {}
+        self._units = np.zeros(0)
+        for joint, parent, child in self.tree:
+            self._add(joint, parent, child)
         self.loops = [
-            _scale(joint, self.length) for joint in joints if joint.name not in used and reached.issuperset(joint.links)
+            joint for joint in joints if joint.name not in self._columns and self._bodies.keys() >= {*joint.links}
         ]
-        units = {joint.name: self.unit(joint) for joint in joints}
-        self.gears = [
-            replace(g, ratio=g.ratio * units[g.driver] / units[g.driven], offset=g.offset / units[g.driven])
-            for g in gears
-            if g.driver in used and g.driven in used
-        ]
-        ways = [(self._way(loop.links[0]), self._way(loop.links[1])) for loop in self.loops]
-        active = {name for one, two in ways for name in set(one) ^ set(two)}
-        active |= {name for gear in self.gears for name in (gear.driver, gear.driven)}
-        self.active = [joint for joint, _, _ in self.tree if joint.name in active]
-        self._columns: dict[str, slice] = {}
-        self.size = 0
-        for joint in self.active:
-            self._columns[joint.name] = slice(self.size, self.size + joint.kind.freedoms)
-            self.size += joint.kind.freedoms
-        self._carried = [self._signs(after) - self._signs(before) for before, after in ways]
-        self._ends = [
-            (joint.ends[0].X, invert_pose(joint.ends[1].X))
-            if joint.links[0] == parent
-            else (joint.ends[1].X, invert_pose(joint.ends[0].X))
-            for joint, parent, _ in self.tree
-        ]
-        self._last: tuple[Values, dict[str, Array]] | None = None
+        through = np.zeros((len(self.loops), self.model.nv), dtype=bool)
+        self._closures, self._misses = pin.StdVec_ConstraintModel(), pin.StdVec_ConstraintData()
+        for number, loop in enumerate(self.loops):
+            (one, X), (two, Y) = (self._bodies[str(end.link)] for end in loop.ends)
+            X, Y = (Z * self._place(end.X) for Z, end in zip((X, Y), loop.ends, strict=True))
+            self._closures.append(pin.ConstraintModel(pin.FrameAnchorConstraintModel(self.model, one, X, two, Y)))
+            self._misses.append(self._closures[-1].createData())
+            for body in {*self.model.supports[one]} ^ {*self.model.supports[two]}:
+                through[number, self.model.idx_vs[body] :][: self.model.nvs[body]] = True
+        self._through, moved = through, np.asarray(through.any(axis=0))
+        first = {name: columns[0] for name, columns in self._columns.items() if columns.size}
+        self.gears = [gear for gear in gears if first.keys() >= {gear.driver, gear.driven}]
+        self._couplings: list[tuple[np.intp, np.intp, Polynomial]] = []
+        for gear in self.gears:
+            driver, driven = first[gear.driver], first[gear.driven]
+            gear = gear.scaled(1 / self._units[driver], 1 / self._units[driven])
+            self._couplings.append((driver, driven, gear.polynomial))
+            moved[[driven, driver]] = True
+        self.active = [joint for joint, _, _ in self.tree if moved[self._columns[joint.name]].any()]
+        self._moved, self._loose = np.flatnonzero(moved), np.flatnonzero(~moved)
+        self.size = len(self._moved)
         self._effort = len(self.tree) + len(self.loops) + self.size**2 // 50
         self._spent = 0
 
-    def _way(self, link: str) -> dict[str, float]:
-        """Return the tree joints on the path to a link, 1 if passed from predecessor to successor, else −1."""
-        signs = {}
-        while link != self.base:
-            joint, link = self._parent[link]
-            signs[joint.name] = 1.0 if joint.links[0] == link else -1.0
-        return signs
+    def _add(self, joint: JointSpec, parent: str, child: str) -> None:
+        """Add a joint of the tree: one for each dof, or a ball; in reverse order if the child is the predecessor."""
+        pin, parts = self._pin, split_elementary(joint.kind, joint.axes)
+        forward, ball = joint.links[0] == parent, joint.kind in _BALLS
+        near, far = joint.ends if forward else joint.ends[::-1]
+        way = 1 if forward or ball else -1
+        slide, turn = pin.JointModelPrismaticUnaligned, pin.JointModelRevoluteUnaligned
+        motions = [
+            (slide if kind is JointType.PRISMATIC else turn)(way * normalise_vector(axis))
+            for kind, axis in parts[::way]
+        ]
+        if ball:
+            motions = [pin.JointModelFreeFlyer() if joint.kind is JointType.FREE else pin.JointModelSpherical()]
+        body, X = self._bodies[parent]
+        X = X * self._place(near.X)
+        for motion in motions:
+            body, X = self.model.addJoint(body, motion, X, str(self.model.njoints)), pin.SE3.Identity()
+        self._bodies[child] = body, X * self._place(far.X).inverse()
+        self._columns[joint.name] = np.arange(len(self._units), self.model.nv)[::way]
+        units = [self.length if kind is JointType.PRISMATIC else 1.0 for kind, _ in parts[::way]]
+        self._units = np.concatenate([self._units, units])
 
-    def _signs(self, way: dict[str, float]) -> Array:
-        """Return these signs, one for each active coordinate, (size,)."""
-        signs = np.zeros(self.size)
-        for joint in self.active:
-            signs[self._columns[joint.name]] = way.get(joint.name, 0.0)
-        return signs
+    def _place(self, X: Array) -> Any:
+        """Return a pose (4, 4) in metres as Pinocchio's, its lengths in characteristic lengths."""
+        return self._pin.SE3(np.array(X[:3, :3]), X[:3, 3] / self.length)
+
+    @cached_property
+    def _data(self) -> Any:
+        return self.model.createData()
+
+    @property
+    def is_too_large(self) -> bool:
+        """There are too many coordinates for Pinocchio's data: its memory grows with their third power."""
+        return self.size > 0 and max(self.model.nv, len(self.loops)) > LOOP_COORDINATES_MAX
 
     def zero(self) -> Values:
         """Return the values with all tree joints at zero, or in the keyframe."""
-        return {joint.name: self._at_start(joint) for joint, _, _ in self.tree}
+        step = np.zeros(self.model.nv)
+        for joint, parent, _ in self.tree:
+            value, columns = self._start.get(joint.name, np.zeros(0)), self._columns[joint.name]
+            if joint.kind in _BALLS and value.ndim == 2:
+                X = self._place(value if joint.links[0] == parent else invert_pose(value))
+                step[columns] = self._pin.log6(X).vector[-len(columns) :]
+            elif joint.kind not in _BALLS and value.shape == columns.shape:
+                step[columns] = value / self._units[columns]
+        return self._integrate(self._pin.neutral(self.model), step)
 
-    def _at_start(self, joint: JointSpec) -> Array:
-        """Return the value of a joint in the keyframe, its lengths in characteristic lengths."""
-        at_zero = get_zero_value(joint)
-        value = self._start.get(joint.name, at_zero)
-        if value.shape != at_zero.shape:
-            return at_zero
-        return scale_pose(value, 1 / self.length) if value.ndim == 2 else value / self.unit(joint)
+    def _integrate(self, values: Values, step: Array) -> Values:
+        return np.asarray(self._pin.integrate(self.model, values, step))
 
-    def unit(self, joint: JointSpec) -> float:
-        """Return metres or radians in one unit of a joint's coordinate."""
-        return self.length if joint.type is JointType.PRISMATIC else 1.0
+    def _measure(self, values: Values) -> Array:
+        """Return the coordinates (nv,), lengths in characteristic lengths."""
+        return np.asarray(self._pin.difference(self.model, self._pin.neutral(self.model), values))
+
+    def coordinates(self, values: Values) -> dict[str, Array]:
+        """Return the coordinates (m, rad) of the tree joints: of a spherical joint the rotation vector, of a free joint
+        the twist, of its link farther from the base."""
+        q = self._units * self._measure(values)
+        return {name: q[columns] for name, columns in self._columns.items()}
+
+    def with_coordinates(self, values: Values, wanted: Mapping[str, float]) -> Values:
+        """Return the values with R and P of the tree at these coordinates (m, rad)."""
+        step, q = np.zeros(self.model.nv), self._measure(values)
+        for name, value in wanted.items():
+            step[self._columns[name]] = value / self._units[self._columns[name]] - q[self._columns[name]]
+        return self._integrate(values, step)
 
     def scaled_poses(self, values: Values) -> dict[str, Array]:
         """Return the pose (4, 4) of every link in the base frame, lengths in characteristic lengths."""
-        if self._last is not None and self._last[0] is values:
-            return self._last[1]
-        X = {self.base: np.eye(4)}
-        for (joint, parent, child), (near, far) in zip(self.tree, self._ends, strict=True):
-            D = compute_joint_pose(joint, values[joint.name])
-            X[child] = X[parent] @ near @ (D if joint.links[0] == parent else invert_pose(D)) @ far
-        self._last = values, X
-        return X
+        model, placements = self.model, [self._pin.SE3.Identity()]
+        for number in range(1, model.njoints):  # without the data of the whole model, which large trees do not have
+            motion = model.joints[number].createData()
+            model.joints[number].calc(motion, values)
+            placements.append(placements[model.parents[number]] * model.jointPlacements[number] * motion.M)
+        return {link: (placements[body] * X).homogeneous for link, (body, X) in self._bodies.items()}
 
     def poses(self, values: Values) -> dict[str, Array]:
         """Return the pose (4, 4) of every link in the base frame, in metres."""
         return {link: scale_pose(X, self.length) for link, X in self.scaled_poses(values).items()}
 
+    def _relate(self, values: Values) -> tuple[Array, Array]:
+        """Return the pose (k, 4, 4) of the second frame of every loop in its first, and its twist there for unit rates
+        of the coordinates (k, 6, nv)."""
+        if not self.loops:
+            return np.zeros((0, 4, 4)), np.zeros((0, 6, self.model.nv))
+        self._pin.computeJointJacobians(self.model, self._data, values)
+        for closure, miss in zip(self._closures, self._misses, strict=True):
+            closure.calc(self.model, self._data, miss)
+        J = self._pin.getConstraintsJacobian(self.model, self._data, self._closures, self._misses)
+        D = np.array([miss.extract().c1Mc2.homogeneous for miss in self._misses])
+        return D, J.reshape(-1, 6, self.model.nv)
+
+    def _couple(self, values: Values) -> tuple[Array, Array]:
+        """Return the residuals of the couplings (c,), and their derivatives by the coordinates (c, nv)."""
+        x, errors = self._measure(values), np.zeros(len(self._couplings))
+        rows = np.zeros((len(errors), self.model.nv))
+        for number, (driver, driven, law) in enumerate(self._couplings):
+            errors[number] = x[driven] - law(x[driver])
+            rows[number, driven] += 1.0
+            rows[number, driver] -= law.deriv()(x[driver])
+        return errors, rows
+
     def system(self, values: Values) -> tuple[Array, Array]:
         """Return the closure residual of all loops and couplings (rows,), and its derivative by the active coordinates
         (rows, size)."""
         self._spent += self._effort
-        X = self.scaled_poses(values)
-        twists = np.zeros((6, self.size))
-        for joint in self.active:
-            twists[:, self._columns[joint.name]] = (
-                np.array(compute_joint_screws(joint, *joint.frames(X))).reshape(-1, 6).T
-            )
-        errors, rows = [np.zeros(0)], [np.zeros((0, self.size))]
-        for loop, signs in zip(self.loops, self._carried, strict=True):
-            error, by_twist = compute_closure_error(loop, *loop.frames(X))
-            relative, own = np.zeros((6, self.size)), signs != 0
-            relative[:, own] = signs[own] * twists[:, own]
-            errors.append(error)
-            rows.append(by_twist @ relative)
-        for gear in self.gears:
-            row = np.zeros((1, self.size))
-            row[0, self._columns[gear.driven]] += 1.0
-            row[0, self._columns[gear.driver]] -= gear.ratio
-            errors.append(_slip(gear, values))
-            rows.append(row)
-        return np.concatenate(errors), np.vstack(rows)
+        D, twists = self._relate(values)
+        errors, wrenches, of = compute_closure_errors(self.loops, D)
+        slips, slopes = self._couple(values)
+        rows = np.vstack([(wrenches[:, None] @ twists[of])[:, 0], slopes])
+        return np.concatenate([errors, slips]), rows[:, self._moved]
+
+    def find_still_joints(self, values: Values) -> set[str]:
+        """Return the joints in loops that no velocity moves."""
+        rates = np.zeros(self.model.nv)
+        rates[self._moved] = np.linalg.norm(self.kernel(values), axis=1)
+        return {joint.name for joint in self.active if rates[self._columns[joint.name]].max() < DIRECTION_SINE_TOL}
+
+    def list_loop_joints(self, name: str) -> list[str]:
+        """Return the joints of the tree in the loop that a joint closes; none if it closes none."""
+        passed = np.array([loop.name == name for loop in self.loops]) @ self._through
+        return [joint.name for joint in self.active if passed[self._columns[joint.name]].any()]
 
     def velocities(self, values: Values, links: Iterable[str]) -> dict[str, Array]:
         """Return the twists (6, n) of links (linear at the base origin, angular) for a basis of the velocities that
         keep the loops closed, joints in no loop last; lengths in characteristic lengths."""
-        X, kernel = self.scaled_poses(values), self.kernel(values)
-        columns, size = dict(self._columns), self.size
-        for joint, _, _ in self.tree:
-            if joint.name not in columns:
-                columns[joint.name] = slice(size, size + joint.kind.freedoms)
-                size += joint.kind.freedoms
-        found = {}
-        for name in links:
-            link, twists = name, np.zeros((6, size))
-            while link != self.base:
-                joint, parent = self._parent[link]
-                sign = 1.0 if joint.links[0] == parent else -1.0
-                twists[:, columns[joint.name]] = (
-                    sign * np.array(compute_joint_screws(joint, *joint.frames(X))).reshape(-1, 6).T
-                )
-                link = parent
-            found[name] = np.hstack([twists[:, : self.size] @ kernel, twists[:, self.size :]])
+        kernel, found = self.kernel(values), {}
+        self._pin.computeJointJacobians(self.model, self._data, values)
+        for link in links:
+            J = self._pin.getJointJacobian(self.model, self._data, self._bodies[link][0], self._pin.WORLD)
+            found[link] = np.hstack([J[:, self._moved] @ kernel, J[:, self._loose]])
         return found
 
     def apart(self, one: Values, other: Values) -> float:
@@ -198,13 +259,17 @@ class LoopAssembly:
         X, Y = self.scaled_poses(one), self.scaled_poses(other)
         return max(float(np.abs(X[link] - Y[link]).max()) for link in X)
 
-    def step(self, values: Values, step: Array) -> Values:
-        """Return the values after a step in the active coordinates."""
-        X, after = self.scaled_poses(values), dict(values)
-        for joint in self.active:
-            R = joint.frames(X)[0][:3, :3] if values[joint.name].ndim == 2 else ORIGIN[:3, :3]
-            after[joint.name] = step_along(joint, values[joint.name], step[self._columns[joint.name]], R)
-        return after
+    def step(self, values: Values, step: Array, loose: Array | float = 0.0) -> Values:
+        """Return the values after a step in the active coordinates, and one of joints in no loop."""
+        whole = np.zeros(self.model.nv)
+        whole[self._moved], whole[self._loose] = step, loose
+        return self._integrate(values, whole)
+
+    def draw(self, values: Values, size: float, rng: np.random.Generator) -> Values:
+        """Return the values a random step ahead that keeps the loops closed to first order; no coordinate moves more
+        than ``size``."""
+        step = draw_in_space(self.kernel(values), rng)
+        return self.step(values, size / max(float(np.max(np.abs(step), initial=0.0)), EXACT_INCIDENCE_TOL) * step)
 
     def close(self, values: Values, iterations: int = 60, held: Collection[str] = ()) -> tuple[Values, float]:
         """Return the closed values reached from ``values``, some joints fixed, and the closure residual."""
@@ -231,7 +296,10 @@ class LoopAssembly:
 
     def moving(self, held: Collection[str]) -> Array:
         """Return 1 for active coordinates, 0 for those of fixed joints, (size,)."""
-        return np.array([float(joint.name not in held) for joint in self.active for _ in range(joint.kind.freedoms)])
+        moving = np.ones(self.model.nv)
+        for name in held:
+            moving[self._columns[name]] = 0.0
+        return moving[self._moved]
 
     def _polish(
         self, values: Values, at: Residual, system: Callable[[Values], tuple[Array, Array]]
@@ -273,14 +341,16 @@ class LoopAssembly:
         _, s, Vt = decompose_matrix(self.system(values)[1], full_matrices=True)
         return np.asarray(Vt[int(np.sum(s > RANK_CUTOFF_FRACTION * max(s, default=1.0))) :].T)
 
+    def misses(self, values: Values) -> dict[str, float]:
+        """Return the closure residual of each loop, then of each coupling."""
+        errors, _, of = compute_closure_errors(self.loops, self._relate(values)[0])
+        sizes = *np.sqrt(np.bincount(of, errors**2, len(self.loops))), *np.abs(self._couple(values)[0])
+        names = [*(loop.name for loop in self.loops), *(gear.name for gear in self.gears)]
+        return {name: float(size) for name, size in zip(names, sizes, strict=True)}
+
     def worst(self, values: Values) -> tuple[str, float]:
         """Return the loop with the largest closure residual, and this residual."""
-        X = self.scaled_poses(values)
-        found = [
-            (float(np.linalg.norm(compute_closure_error(loop, *loop.frames(X))[0])), loop.name) for loop in self.loops
-        ]
-        found += [(abs(float(_slip(gear, values)[0])), gear.name) for gear in self.gears]
-        miss, name = max(found, default=(0.0, "none"))
+        miss, name = max(((miss, name) for name, miss in self.misses(values).items()), default=(0.0, "none"))
         return name, miss
 
     @property
@@ -292,88 +362,65 @@ class LoopAssembly:
 
     def followed(self, values: Values) -> Values:
         """Return the values with each driven joint of a coupling where its driver puts it."""
-        found = dict(values)
+        before = self._measure(values)
+        after = before.copy()
         for _ in self.gears:  # a driven joint may drive another one
-            found |= {gear.driven: gear.ratio * found[gear.driver] + gear.offset for gear in self.gears}
-        return found
+            for driver, driven, law in self._couplings:
+                after[driven] = law(after[driver])
+        return self._integrate(values, after - before)
 
-    def beyond(self, values: Values) -> dict[str, Array]:
-        """Return the R and P outside of their limits, each with the nearest value a little within them."""
-        found, closing = {}, self.closing(values)
+    def beyond(self, values: Values) -> dict[str, float]:
+        """Return the R and P outside of their limits, each with the nearest coordinate (m, rad) a little within
+        them."""
+        found, known = {}, self.closing(values) | self.singles(values)
         for joint in [*(joint for joint, _, _ in self.tree), *self.loops]:
             if joint.limits is None or joint.kind not in SINGLE:
                 continue
-            unit = self.unit(joint)
-            lower, upper = (
-                far if bound is None else bound / unit
-                for bound, far in ((joint.limits.lower, -np.inf), (joint.limits.upper, np.inf))
-            )
-            value = values.get(joint.name, np.array([closing.get(joint.name, 0.0) / unit]))
-            if lower < upper and not lower - EXACT_INCIDENCE_TOL <= value[0] <= upper + EXACT_INCIDENCE_TOL:
-                inside = min(LIMIT_INSET_MIN, (upper - lower) / 4)
-                found[joint.name] = np.clip(value, lower + inside, upper - inside)
+            lower = -np.inf if joint.limits.lower is None else joint.limits.lower
+            upper = np.inf if joint.limits.upper is None else joint.limits.upper
+            q, unit = known.get(joint.name, 0.0), self.length if joint.kind is JointType.PRISMATIC else 1.0
+            if lower < upper and not lower - EXACT_INCIDENCE_TOL * unit <= q <= upper + EXACT_INCIDENCE_TOL * unit:
+                inside = min(LIMIT_INSET_MIN * unit, (upper - lower) / 4)
+                found[joint.name] = float(np.clip(q, lower + inside, upper - inside))
         return found
+
+    def singles(self, values: Values) -> dict[str, float]:
+        """Return the coordinates (m, rad) of the R and P of the tree."""
+        q = self.coordinates(values)
+        return {joint.name: float(q[joint.name][0]) for joint, _, _ in self.tree if joint.kind in SINGLE}
 
     def wound(self, values: Values, residual: float) -> tuple[Values, float]:
         """Return the values (and their closure residual) with full rotations added that bring joints within their
         limits."""
         geared = {name for gear in self.gears for name in (gear.driver, gear.driven)}
         free = {joint.name for joint, _, _ in self.tree if joint.kind is JointType.REVOLUTE} - geared
+        q = self.singles(values)
         turns = {
-            name: values[name] + 2 * np.pi * np.round((inside - values[name]) / (2 * np.pi))
+            name: q[name] + 2 * np.pi * np.round((inside - q[name]) / (2 * np.pi))
             for name, inside in self.beyond(values).items()
             if name in free
         }
-        still = self.beyond(values | turns)
-        return values | {name: value for name, value in turns.items() if name not in still}, residual
+        still = self.beyond(self.with_coordinates(values, turns))
+        turns = {name: turn for name, turn in turns.items() if name not in still}
+        return self.with_coordinates(values, turns), residual
 
     def closing(self, values: Values) -> dict[str, float]:
         """Return the distance from their zero (m, rad) of the R and P that close loops: that of a closure is where all
         tree joints are at zero, that of a joint of the file's tree where its two frames meet."""
-        now, then = (
-            self.scaled_poses(values),
-            self.scaled_poses({joint.name: get_zero_value(joint) for joint, _, _ in self.tree}),
-        )
+        now, then = (self._relate(each)[0] for each in (values, self._pin.neutral(self.model)))
         found = {}
-        for spec in self.loops:
-            if spec.kind not in SINGLE:
-                continue
-            X, Y = spec.frames(now)
-            X_0, Y_0 = spec.frames(then)
-            D, D_0 = invert_pose(X) @ Y, np.eye(4) if spec.in_tree else invert_pose(X_0) @ Y_0
-            axis = normalise_vector(spec.axes[0])
+        for spec, D, D_0 in zip(self.loops, now, then, strict=True):
+            X = ORIGIN if spec.in_tree else D_0
             if spec.kind is JointType.PRISMATIC:
-                found[spec.name] = float(axis @ (D[:3, 3] - D_0[:3, 3])) * self.length
-            else:
-                turn = convert_to_quaternions(D[:3, :3] @ D_0[:3, :3].T)
-                found[spec.name] = 2 * math.atan2(float(axis @ turn[1:]), float(turn[0]))
+                found[spec.name] = float(normalise_vector(spec.axes[0]) @ (D - X)[:3, 3]) * self.length
+            elif spec.kind is JointType.REVOLUTE:
+                found[spec.name] = turn_about(normalise_vector(spec.axes[0]), D[:3, :3] @ X[:3, :3].T)[0]
         return {name: q for name, q in found.items() if abs(q) > EXACT_INCIDENCE_TOL}
 
     @classmethod
     def of(cls, mechanism: Mechanism) -> LoopAssembly:
         """Return the assembly of a mechanism's joints: closed at zero."""
-        return cls(mechanism.base, joints_of(mechanism), gears_of(mechanism))
-
-
-def joints_of(mechanism: Mechanism) -> list[JointSpec]:
-    """Return a mechanism's joints as a file would give them: both frames at the joint's centre, parallel to the
-    base's."""
-    found = []
-    for joint in mechanism.joints.values():
-        one, two = (
-            FrameSpec(link, invert_pose(mechanism.links[link].pose) @ build_pose(joint.point)) for link in joint.links
-        )
-        found.append(JointSpec(joint.name, joint.type, (one, two), joint.axes, in_tree=joint.in_tree))
-    return found
-
-
-def gears_of(mechanism: Mechanism) -> list[CouplingSpec]:
-    """Return a mechanism's couplings by the joints that carry their links."""
-    carrier = {joint.successor: joint.name for joint in mechanism.joints.values() if joint.in_tree}
-    return [
-        CouplingSpec(each.name, carrier[each.predecessor], carrier[each.successor], each.ratio)
-        for each in mechanism.couplings
-    ]
+        return cls(mechanism.base, list_joint_specs(mechanism), list_coupling_specs(mechanism))
 
 
 @dataclass(frozen=True, eq=False)
@@ -414,10 +461,13 @@ def _within_limits(assembly: LoopAssembly, values: Values, held: frozenset[str],
     values, residual = assembly.wound(*assembly.close(values, held=held))
     first = LoopSolution(values, residual, pushed, tuple(assembly.beyond(values)))
     for _ in range(FIXED_JOINT_TRIES_COUNT if residual <= assembly.noise else 0):
-        inside = {name: value for name, value in assembly.beyond(values).items() if name in values and name not in held}
+        movable = assembly.singles(values).keys() - held
+        inside = {name: q for name, q in assembly.beyond(values).items() if name in movable}
         if not inside:
             break
-        near, left = assembly.wound(*assembly.close(assembly.followed(values | inside), held=held | inside.keys()))
+        near, left = assembly.wound(
+            *assembly.close(assembly.followed(assembly.with_coordinates(values, inside)), held=held | inside.keys())
+        )
         values, residual = assembly.wound(*assembly.close(near, held=held))
         if left <= assembly.noise:
             values, residual, held = near, left, held | inside.keys()
@@ -432,14 +482,13 @@ def regular_values(assembly: LoopAssembly, values: Values) -> Values | None:
     here = assembly.rank(values)
     if assembly.freedoms(here) == 0:
         return None
-    kernel = assembly.kernel(values)
     found: list[tuple[int, float, Values]] = []
     rng = np.random.default_rng(0)
 
-    def look(size: float, direction: Array) -> bool:
+    def look(ahead: Values) -> bool:
         """Return True if a step leads to closed values; they are kept if the loops have a higher rank, or a clearer
         one, there."""
-        there, residual = assembly.close(assembly.step(values, size / float(np.max(np.abs(direction))) * direction))
+        there, residual = assembly.close(ahead)
         rank = assembly.rank(there)
         if (
             residual <= 10 * CLOSURE_SOLVER_TOL
@@ -452,36 +501,29 @@ def regular_values(assembly: LoopAssembly, values: Values) -> Values | None:
             found.append((rank.value, rank.weakest, there))
         return residual <= 10 * CLOSURE_SOLVER_TOL
 
-    closed = [look(size, kernel @ rng.normal(size=kernel.shape[1])) for size in (0.3, 0.15, 0.5)]
+    closed = [look(assembly.draw(values, size, rng)) for size in (0.3, 0.15, 0.5)]
     if (
         here.weakest > NEARLY_SINGULAR_ZERO_FRACTION
         and any(closed)
         and not any(value > here.value for value, _, _ in found)
     ):
         return None
+    kernel = assembly.kernel(values)
     every = rng.permutation(kernel @ kernel.T)  # each joint moved, as the loops allow
-    ways = [way for way in every if np.max(np.abs(way)) > VECTOR_LENGTH_MIN][: LOOP_ASSEMBLY_TRIES_MAX // 2]
+    sizes = [np.max(np.abs(way)) for way in every]
+    ways = [way / size for way, size in zip(every, sizes, strict=True) if size > VECTOR_LENGTH_MIN]
     for size in SINGULAR_STEPS:
         before = len(found)
-        for way in ways:
-            look(size, way)
-            look(size, -way)
+        for way in ways[: LOOP_ASSEMBLY_TRIES_MAX // 2]:
+            look(assembly.step(values, size * way))
+            look(assembly.step(values, -size * way))
         most = max((value for value, _, _ in found), default=0)
         firm = [each for each in found[before:] if each[0] == most and each[1] > NEARLY_SINGULAR_ZERO_FRACTION]
         if firm:
             there = max(firm, key=lambda each: each[1])[2]
-            return regular_values(assembly, there) or there  # other loops may still be singular
+            further = regular_values(assembly, there)  # other loops may still be singular
+            return there if further is None else further
     return max(found, key=lambda each: each[:2])[2] if found else None
-
-
-def _slip(gear: CouplingSpec, values: Values) -> Array:
-    """Return the residual of a coupling, (1,)."""
-    return values[gear.driven][:1] - gear.ratio * values[gear.driver][:1] - gear.offset
-
-
-def _scale(joint: JointSpec, length: float) -> JointSpec:
-    one, two = (FrameSpec(end.link, scale_pose(end.X, 1 / length), end.line) for end in joint.ends)
-    return replace(joint, ends=(one, two))
 
 
 def _spread(base: str, tree: Sequence[TreeJoint]) -> float:

@@ -14,8 +14,8 @@ from ...geometry.vectors import Array, build_pose, freeze_array, invert_pose, tr
 from ...mechanism.model import Joint, JointType, Limits, Mechanism
 from ...tolerances import EXACT_INCIDENCE_TOL, GEOMETRY_DIFFERENCE_TOL, INCIDENCE_TOL, POINT_DISTANCE_TOL
 from .. import numerals, xml
-from ..jointgraph import ORIGIN, join_names, scale_pose
-from ..jointmotion import compute_joint_pose
+from ..conversion import find_joint_value, list_coupling_specs, list_joint_specs
+from ..jointgraph import ORIGIN, join_names
 from .loops import SINGLE, LoopAssembly, Values
 
 COUNTED_FROM_ZERO = {
@@ -28,7 +28,7 @@ COUNTED_FROM_ZERO = {
 def with_zero_at(mechanism: Mechanism, assembly: LoopAssembly, values: Values) -> Mechanism:
     """Return the mechanism with another closed configuration for its zero; the assembly's joints count from its
     zero."""
-    return zeroed_at(mechanism, assembly.poses(values), _singles(assembly, values))
+    return zeroed_at(mechanism, assembly.poses(values), assembly.singles(values))
 
 
 def zeroed_at(
@@ -61,29 +61,15 @@ def zeroed_at(
 
 def at_file_zero(mechanism: Mechanism) -> Mechanism | None:
     """Return the mechanism with the file's zero for its zero configuration; None if its loops are open there."""
-    assembly = LoopAssembly.of(mechanism)
+    start, specs = {}, list_joint_specs(mechanism)
+    for spec, joint in zip(specs, mechanism.joints.values(), strict=True):
+        if joint.offset is not None and joint.offset.ndim == 1:
+            start[joint.name] = -joint.offset
+        elif joint.offset is not None:
+            centre = build_pose(joint.point)
+            start[joint.name] = find_joint_value(spec, invert_pose(centre) @ joint.offset @ centre)
+    assembly = LoopAssembly(mechanism.base, specs, list_coupling_specs(mechanism), start)
     values = assembly.zero()
-    for spec, _, _ in assembly.tree:
-        joint = mechanism.joints[spec.name]
-        if joint.offset is None:
-            continue
-        if joint.offset.ndim == 1:
-            values[spec.name] = -joint.offset / (
-                [assembly.length, 1.0] if joint.type is JointType.CYLINDRICAL else assembly.unit(spec)
-            )
-            continue
-        centre = build_pose(joint.point)
-        D = scale_pose(invert_pose(centre) @ joint.offset @ centre, 1 / assembly.length)
-        values[spec.name] = (
-            D
-            if joint.type is not JointType.PLANAR
-            else np.array(
-                [
-                    decompose_rotation(axis[None], D[:3, :3])[0] if K is not None else axis @ D[:3, 3]
-                    for axis, K in spec.parts
-                ]
-            )
-        )
     return with_zero_at(mechanism, assembly, values) if assembly.worst(values)[1] <= GEOMETRY_DIFFERENCE_TOL else None
 
 
@@ -144,29 +130,16 @@ def _shifted(limits: Limits | None, q: float) -> Limits | None:
 
 def with_offsets(joints: Mapping[str, Joint], assembly: LoopAssembly, values: Values) -> dict[str, Joint]:
     """Return the joints of a file at ``values``, with limits and other coordinates counted from there."""
-    found = dict(joints)
-    X = assembly.poses(values)
+    found, X, q = dict(joints), assembly.poses(values), assembly.coordinates(values)
     for spec, _, _ in assembly.tree:
-        value, joint = values[spec.name], found[spec.name]
         if spec.kind in (*SINGLE, JointType.UNIVERSAL, JointType.CYLINDRICAL):
-            unit = [assembly.length, 1.0] if spec.kind is JointType.CYLINDRICAL else assembly.unit(spec)
-            found[spec.name] = _counted_from(joint, value * unit)
+            found[spec.name] = _counted_from(joints[spec.name], q[spec.name])
         else:
-            X_P = X[spec.links[0]] @ scale_pose(spec.ends[0].X, assembly.length)
-            D = scale_pose(compute_joint_pose(spec, value), assembly.length)
-            found[spec.name] = _displaced(joint, X_P @ invert_pose(D) @ invert_pose(X_P))
-    for name, q in assembly.closing(values).items():
-        found[name] = _counted_from(joints[name], np.array([q]))
+            X_P, X_S = spec.frames(X)
+            found[spec.name] = _displaced(joints[spec.name], X_P @ invert_pose(X_S))
+    for name, shift in assembly.closing(values).items():
+        found[name] = _counted_from(joints[name], np.array([shift]))
     return found
-
-
-def _singles(assembly: LoopAssembly, values: Values) -> dict[str, float]:
-    """Return the coordinates (m, rad) of the R and P of the tree."""
-    return {
-        spec.name: float(values[spec.name][0]) * assembly.unit(spec)
-        for spec, _, _ in assembly.tree
-        if spec.kind in SINGLE
-    }
 
 
 def _recount(fragment: str, q: float) -> str:
@@ -191,11 +164,9 @@ def count_from(element: xml.Element, q: float) -> None:
 
 def moves(assembly: LoopAssembly, values: Values) -> str:
     """Return the coordinates that differ from zero as a text."""
-    found = []
-    for joint, _, _ in assembly.tree:
-        value = values[joint.name]
-        for number, q in enumerate(value if value.ndim == 1 else value[:3, :3][[2, 0, 1], [1, 2, 0]]):
-            if abs(q) > INCIDENCE_TOL:
-                suffix = f"[{number}]" if value.size > 1 else ""
-                found.append(f"{joint.name}{suffix} = {q * assembly.unit(joint):.6g}")
-    return join_names(found)
+    return join_names(
+        f"{name}[{number}] = {each:.6g}" if len(q) > 1 else f"{name} = {each:.6g}"
+        for name, q in assembly.coordinates(values).items()
+        for number, each in enumerate(q)
+        if abs(each) > INCIDENCE_TOL
+    )

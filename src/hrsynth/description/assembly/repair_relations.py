@@ -17,12 +17,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...budgets import LINK_INCIDENCE_JOINTS_MAX
 from ...geometry import lines
 from ...geometry.vectors import Array, normalise_vector
 from ...mechanism import graphs
 from ...mechanism.model import Joint, JointType, Mechanism
-from ...tolerances import AXIS_MEETING_SINE_MIN, COMPLEX_STEP_MAX
+
+COMPLEX_STEP_MAX = 1e-20
+"""Imaginary step of the slope of a polynomial, exact because nothing cancels."""
+AXIS_MEETING_SINE_MIN = 0.1
+"""Sine of the angle between two axes below which their intersection is not computed."""
+LINK_INCIDENCE_JOINTS_MAX = 40
+"""Joints of one link above which their incidences are not searched."""
 
 LINES = (JointType.REVOLUTE, JointType.CYLINDRICAL)
 BALLS = (JointType.SPHERICAL, JointType.UNIVERSAL)
@@ -31,7 +36,7 @@ Vectors = NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False)
-class GeometricRelation:
+class RepairRelation:
     """Equation f(v₁, v₂, …) = 0 of points and directions; f is a polynomial, (..., 3) → (..., m), real or complex.
     ``at`` is the first coordinate of each of its vectors; ``kind`` and ``of`` name it."""
 
@@ -214,10 +219,10 @@ def _clusters(apart: Array, within: float) -> list[list[int]]:
     return [np.flatnonzero(label == k).tolist() for k in range(count)]
 
 
-def certain(at: JointCoordinates) -> Iterator[GeometricRelation]:
+def list_definitions(at: JointCoordinates) -> Iterator[RepairRelation]:
     """Yield the relations that hold by definition: directions have length one, the axes of a U are perpendicular."""
     for i in at.members:
-        yield GeometricRelation("unit", (), _length, (i,), 0.0)
+        yield RepairRelation("unit", (), _length, (i,), 0.0)
     for joint in at.mechanism.joints.values():
         if joint.type is JointType.UNIVERSAL:
             yield _perpendicular(
@@ -225,7 +230,7 @@ def certain(at: JointCoordinates) -> Iterator[GeometricRelation]:
             )
 
 
-def of_axes(at: JointCoordinates, bodies: Bodies) -> Iterator[GeometricRelation]:
+def list_axis_relations(at: JointCoordinates, bodies: Bodies) -> Iterator[RepairRelation]:
     """Yield candidates among axes and centres: parallel, perpendicular on a body, coaxial on a body, through a
     point."""
     x, length = at.start, at.mechanism.length
@@ -234,7 +239,7 @@ def of_axes(at: JointCoordinates, bodies: Bodies) -> Iterator[GeometricRelation]
             worst = max(
                 float(np.linalg.norm(np.cross(at.mechanism.joints[name].axes[k], x[i : i + 3]))) for name, k in members
             )
-            yield GeometricRelation("parallel", tuple(dict.fromkeys(name for name, _ in members)), _length, (i,), worst)
+            yield RepairRelation("parallel", tuple(dict.fromkeys(name for name, _ in members)), _length, (i,), worst)
     seen = set()
     for one, two in Bodies(
         at.mechanism, (JointType.FIXED, JointType.PRISMATIC)
@@ -248,7 +253,7 @@ def of_axes(at: JointCoordinates, bodies: Bodies) -> Iterator[GeometricRelation]
     for one, two in bodies.pairs():
         if one.type in LINES and two.type in LINES and at.axis_of(one) == at.axis_of(two):
             miss = lines.measure_line_distance(one.point, two.point, two.axis) / length
-            yield GeometricRelation(
+            yield RepairRelation(
                 "coaxial",
                 (one.name, two.name),
                 _on_line,
@@ -260,22 +265,22 @@ def of_axes(at: JointCoordinates, bodies: Bodies) -> Iterator[GeometricRelation]
             joint, place = at.mechanism.joints[name], x[i : i + 3]
             if joint.type in LINES:
                 miss = lines.measure_line_distance(place, joint.point / length, joint.axis)
-                yield GeometricRelation(
+                yield RepairRelation(
                     "through one point", tuple(names), _on_line, (i, at.point[name], at.axis_of(joint)), miss
                 )
             elif at.point[name] != i:
                 miss = float(np.linalg.norm(place - joint.point / length))
-                yield GeometricRelation("through one point", tuple(names), np.subtract, (i, at.point[name]), miss)
+                yield RepairRelation("through one point", tuple(names), np.subtract, (i, at.point[name]), miss)
 
 
-def _perpendicular(at: JointCoordinates, one: str, two: str, i: int, j: int) -> GeometricRelation:
+def _perpendicular(at: JointCoordinates, one: str, two: str, i: int, j: int) -> RepairRelation:
     x = at.start
-    return GeometricRelation(
+    return RepairRelation(
         "perpendicular", tuple(dict.fromkeys((one, two))), _normal, (i, j), abs(float(x[i : i + 3] @ x[j : j + 3]))
     )
 
 
-def of_centres(at: JointCoordinates, normal: Mechanism, x: Array) -> Iterator[GeometricRelation]:
+def list_centre_relations(at: JointCoordinates, normal: Mechanism, x: Array) -> Iterator[RepairRelation]:
     """Yield candidates among the spherical joints of the ``normal`` form of a mechanism with coordinates ``x``: in line
     with an axis or normal to it, in one plane; rods between the same bodies equal."""
     bodies = Bodies(normal)
@@ -310,10 +315,10 @@ def of_centres(at: JointCoordinates, normal: Mechanism, x: Array) -> Iterator[Ge
                 continue
             for a, name in axes.items():
                 names = (one.name, two.name, name)
-                yield GeometricRelation(
+                yield RepairRelation(
                     "in line with an axis", names, _on_line, (i, j, a), float(np.linalg.norm(np.cross(arm, vector(a))))
                 )
-                yield GeometricRelation("normal to an axis", names, _across, (i, j, a), abs(float(arm @ vector(a))))
+                yield RepairRelation("normal to an axis", names, _across, (i, j, a), abs(float(arm @ vector(a))))
         yield from _flat([(joint.name, spot(joint)) for joint in balls], vector, at.within)
     for slide in normal.joints.values():
         ends = [[each for each in bodies.on[bodies.of[link]] if each.type in BALLS] for link in slide.links]
@@ -324,13 +329,11 @@ def of_centres(at: JointCoordinates, normal: Mechanism, x: Array) -> Iterator[Ge
             if size > at.within / AXIS_MEETING_SINE_MIN:
                 miss = float(np.linalg.norm(np.cross(arm, vector(places[2])))) / max(1.0, size)
                 names = (one.name, two.name, slide.name)
-                yield GeometricRelation("in line with an axis", names, _on_line, places, miss)
+                yield RepairRelation("in line with an axis", names, _on_line, places, miss)
     yield from _rods(bodies, spot, at, vector)
 
 
-def _flat(
-    balls: Sequence[tuple[str, int]], vector: Callable[[int], Array], within: float
-) -> Iterator[GeometricRelation]:
+def _flat(balls: Sequence[tuple[str, int]], vector: Callable[[int], Array], within: float) -> Iterator[RepairRelation]:
     """Yield the relations that put all centres of a body in one plane with the three that span the largest triangle."""
 
     def area(three: Iterable[tuple[str, int]]) -> float:
@@ -347,14 +350,12 @@ def _flat(
     for name, i in balls:
         if i not in corners:
             miss = abs(float(_coplanar(*(vector(j) for j in (*corners, i)))[0])) / size
-            yield GeometricRelation(
-                "in one plane", (*(other for other, _ in three), name), _coplanar, (*corners, i), miss
-            )
+            yield RepairRelation("in one plane", (*(other for other, _ in three), name), _coplanar, (*corners, i), miss)
 
 
 def _rods(
     bodies: Bodies, spot: Callable[[Joint], int], at: JointCoordinates, vector: Callable[[int], Array]
-) -> Iterator[GeometricRelation]:
+) -> Iterator[RepairRelation]:
     """Yield the relation of two links of two joints between the same two bodies: equal from centre to centre."""
     table: dict[frozenset[int], list[Sequence[Joint]]] = defaultdict(list)
     for own, joints in bodies.on.items():
@@ -368,8 +369,8 @@ def _rods(
             names, points = tuple(j.name for j in joints), tuple(spot(joint) for joint in joints)
             if all(joint.type in BALLS for joint in joints):
                 miss = float(np.linalg.norm(_equal(*(vector(i) for i in points))))
-                yield GeometricRelation("equal rods", names, _equal, points, miss)
+                yield RepairRelation("equal rods", names, _equal, points, miss)
             elif all(joint.type is JointType.REVOLUTE for joint in joints):
                 at_all = (*points, at.axis_of(joints[0]))
                 miss = float(np.linalg.norm(_equal_across(*(vector(i) for i in at_all))))
-                yield GeometricRelation("equal rods", names, _equal_across, at_all, miss)
+                yield RepairRelation("equal rods", names, _equal_across, at_all, miss)
