@@ -13,7 +13,8 @@ from scipy.spatial.transform import Rotation
 from hrsynth.analysis.advice import advise
 from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.derive import derive
-from hrsynth.analysis.observed import ObservedRobot, restrict_samples
+from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.analysis.setup_records import describe_other_modes
 from hrsynth.analysis.verdict import compute_verdict
 from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.geometry import build_mechanism
@@ -164,7 +165,7 @@ def test_samples_of_a_pod_stay_in_its_operation_mode(dimensions: int, seed: int)
     for at in setup.configurations:
         R = at.pose("platform")[:3, :3]
         assert np.abs(R - setup.motion.home[:3, :3]).max() < 1e-7
-    verdict = compute_verdict(setup, ("2", "3"), restrict_samples(setup.all_samples, segments[1:3]))
+    verdict = compute_verdict(setup, ("2", "3"), setup.all_samples.restrict(segments[1:3]))
     assert (verdict.rank, verdict.dof) == (2, 3)
     assert [freedom.name for freedom in verdict.unobserved] == ["translation along z"]
 
@@ -176,7 +177,7 @@ def test_another_operation_mode_is_named_and_can_be_asked_for() -> None:
     found = legs(robot, seed=seed)
     (other,) = found.setup.all_samples.other_modes
     assert (found.setup.all_samples.signature.motion, other.signature.motion) == ("3T", "3R")
-    assert "legs 2, 3 observe 3 of 3" in found.setup.beside()[0]
+    assert "legs 2, 3 observe 3 of 3" in describe_other_modes(found.setup)[0]
     there = legs(robot, at=str(Pose.of(other.at.pose("platform"))), seed=seed)
     ranks = [{each.legs: each.rank for each in answer.sets}["2", "3"] for answer in (found, there)]
     assert ranks == [2, 3]

@@ -26,15 +26,17 @@ from strategies import split
 PIECES = 300
 
 
-def along_line(start: ClosedConfiguration, names: list[str], wanted: dict[str, tuple[float, ...]]) -> Array:
+def along_line(
+    start: ClosedConfiguration, names: list[str], wanted: dict[str, tuple[float, ...]], pieces: int = PIECES
+) -> Array:
     """Where plain Newton steps of least norm lead, on a straight line of the coordinates in many pieces."""
     model = start.model
     places = [i for name in names for i in model.coordinates[name]]
     units = [model.length if model.mechanism.joints[name].type.has_translation else 1.0 for name in names]
     goal = np.concatenate([np.array(wanted[name]) / unit for name, unit in zip(names, units, strict=True)])
     begun, q = model.difference(model.q0, start.q)[places], start.q
-    for k in range(1, PIECES + 1):
-        aim = begun + (goal - begun) * k / PIECES
+    for k in range(1, pieces + 1):
+        aim = begun + (goal - begun) * k / pieces
         for _ in range(8):
             error = np.concatenate([model.residual(q), model.difference(model.q0, q)[places] - aim])
             if np.linalg.norm(error) < 1e-11:
@@ -172,11 +174,23 @@ def test_a_joint_at_its_limit_stops_the_way_and_is_named() -> None:
     with pytest.raises(PoseReachFailure, match=f"{joint} is at its limit") as refused:
         hrsynth.check(limited("3rrr_m1", joint, abs(float(value)) / 2), at="motors:0.2,0.2,0.2")
     assert 0.2 < refused.value.came < 0.8
+    assert f"{100 * refused.value.came:.3g} % of the path" in str(refused.value)
 
 
 def test_motors_that_no_assembly_allows_stop_at_a_singularity() -> None:
-    with pytest.raises(PoseReachFailure, match=r"a singularity lies ahead, at which shoulder_\d stops"):
+    """The last motor values, their part of the line and the singular value that vanishes are told."""
+    with pytest.raises(PoseReachFailure, match=r"a singularity lies ahead, at which shoulder_\d stops") as refused:
         hrsynth.check("delta", at="motors:5,0.2,0.3")
+    told = refused.value
+    assert told.last == f"motors:{str(told).partition(', to ')[2].partition('. ')[0]}"
+    start = hrsynth.observe("delta", at=told.last).all_samples.start
+    aim = np.array([5.0, 0.2, 0.3])
+    values = np.array([read_joints(start)[f"shoulder_{k}"][0] for k in (1, 2, 3)])
+    assert values == pytest.approx(told.came * aim, abs=1e-4)
+    places = [start.model.coordinates[f"shoulder_{k}"][0] for k in (1, 2, 3)]
+    least = np.linalg.svd(start.kernel()[0][places], compute_uv=False).min()
+    assert float(str(told).partition("singular value ")[2].partition(")")[0]) == pytest.approx(least, rel=0.1)
+    assert least < 0.05
 
 
 def test_coordinates_that_contradict_each_other_are_refused() -> None:

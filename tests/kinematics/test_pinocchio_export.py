@@ -207,7 +207,7 @@ def test_gears_are_rows():
         builder.link(name, (0.0, 0.0, 0.1 * number))
     builder.joint("turn", "R", "base", "one", (0, 0, 0), axis=(0, 0, 1))
     builder.joint("slide", "P", "one", "two", (0, 0, 0.1), axis=(1, 0, 0))
-    robot = builder.build(platform="two").changed(couplings=(Coupling("gear", "one", "two", 0.3),))
+    robot = builder.build(platform="two").changed(couplings=(Coupling("gear", "turn", "slide", 0.3),))
     check_closed(robot)
     np.testing.assert_array_equal(robot.to_pinocchio().couplings, [[-0.3, 1.0]])
 

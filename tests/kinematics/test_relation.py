@@ -43,7 +43,7 @@ def test_the_platform_generically_does_what_it_does_at_the_samples(robot: str) -
 def test_measured_again_the_samples_say_the_same(robot: str) -> None:
     """ρ of fewer observations, computed anew, is the projection of ρ of all."""
     setup = setting_of(robot, ("1",) if "1" in setting_of(robot).labels else None)
-    again = setup.measuring(setup.observed)
+    again = setup.all_samples.measure(setup.observed)
     for old, new in zip(setup.samples.members, again.members, strict=True):
         assert compute_largest_angle(old.relation.basis, new.relation.basis) < 1e-9
         assert (old.relation.rank, old.relation.sizes) == (new.relation.rank, new.relation.sizes)

@@ -7,10 +7,10 @@ import pytest
 
 from hrsynth.analysis.pose_requests import observe
 from hrsynth.errors import UndefinedValue
-from hrsynth.geometry.gauss_newton import DampingFactor, Residual, descend, descend_together
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.path_tracking import track_paths
 from hrsynth.kinematics.tasks import solve
+from hrsynth.solving.gauss_newton import DampingFactor, Residual, descend, descend_together
 from hrsynth.tolerances import CLOSURE_SOLVER_TOL, WAYPOINT_RESIDUAL_TOL
 from kinematics.robots import setting_of
 

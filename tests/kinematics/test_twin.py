@@ -265,7 +265,7 @@ def test_of_two_floating_joints_the_same_is_idle_with_gears() -> None:
     b.joint("first", "6", "base", "one")
     b.joint("hinge", "R", "one", "other", axis=(0, 0, 1))
     b.joint("second", "6", "base", "other")
-    b.coupling("gear", "wheel", "other", 2.0)
+    b.coupling("gear", "wheel", "hinge", 2.0)
     robot = b.build("other")
     (idle,) = robot.idle
     for name in ("first", "second"):

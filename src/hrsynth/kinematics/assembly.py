@@ -13,7 +13,6 @@ from itertools import product
 
 import numpy as np
 
-from ..budgets import LEG_CLOSURE_ITERATIONS_MAX
 from ..description.assembly.zero_configuration import zeroed_at
 from ..errors import LoopClosureFailure
 from ..geometry.vectors import Array, invert_pose
@@ -27,6 +26,9 @@ from .leg_reach import extract_leg
 from .leg_solutions import UNDECIDED, LegEnd, LegSolutions, ReachFailure, solve_leg
 from .pinocchio_model import PinocchioModel
 from .tasks import LinkPoses, PoseAndValuesTask, solve
+
+LEG_CLOSURE_ITERATIONS_MAX = 400
+"""Largest number of iterations that close a leg at a pose."""
 
 LEG_START_CONFIGURATIONS_COUNT = 24
 """Number of configurations of a leg, the zero configuration first, from which it is closed at a pose: for each of its

@@ -17,22 +17,20 @@ import numpy as np
 
 from ..geometry.ranks import compute_largest_angle, compute_singular_values
 from ..geometry.vectors import Array
-from ..tolerances import (
-    BOUND_ROUNDING_FRACTION,
-    NONZERO_SINGULAR_VALUE_MIN,
-    RANK_CUTOFF_FRACTION,
-    SLOPE_STEP_MAX,
-    ZERO_SINGULAR_VALUE_MAX,
-)
+from ..tolerances import NONZERO_SINGULAR_VALUE_MIN, RANK_CUTOFF_FRACTION, SLOPE_STEP_MAX, ZERO_SINGULAR_VALUE_MAX
 from .configuration import ClosedConfiguration
 from .velocity_relation import VelocityRelation
+
+BOUND_ROUNDING_FRACTION = 1e-3
+"""Fraction of a limit that a bound reserves for rounding."""
 
 TANGENT_ANGLE_MAX_RAD = 0.3
 """Largest principal angle (radians) between the tangent spaces at both ends of a step."""
 SINGULAR_VALUE_RATIO_MAX = 1.5
 """Largest ratio between the loops' singular values, in order, at the start of a step and along it."""
 STEP_CORRECTION_MAX_FRACTION = 0.2
-"""Longest correction, as part of the step: the bend of a smooth branch that ``TURNED`` allows, with a margin."""
+"""Longest correction, as part of the step: the bend of a smooth branch that ``TANGENT_ANGLE_MAX_RAD`` allows, with a
+margin."""
 EVEN_DECREASE_TOL = 0.2
 """Part of the smallest singular value by which its fall to a singularity may differ from a linear one."""
 ALL_OBSERVATION_SETS_MAX = 4
@@ -62,8 +60,8 @@ def has_steady_values_along(here: ClosedConfiguration, step: Array) -> bool:
 
 
 def is_small_principal_angle(A: Array, B: Array) -> bool:
-    """Return True if the largest principal angle is at most ``TURNED``: its sine is at most the Frobenius norm of the
-    outer part."""
+    """Return True if the largest principal angle is at most ``TANGENT_ANGLE_MAX_RAD``: its sine is at most the
+    Frobenius norm of the outer part."""
     if A.shape == B.shape and np.linalg.norm(B - A @ (A.T @ B)) < (1 - BOUND_ROUNDING_FRACTION) * np.sin(
         TANGENT_ANGLE_MAX_RAD
     ):

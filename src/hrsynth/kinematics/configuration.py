@@ -18,8 +18,11 @@ from ..geometry.ranks import Rank, Spectrum, compute_matrix_spectra, compute_mat
 from ..geometry.vectors import Array, freeze_array
 from ..mechanism.observation import Observation
 from ..results import Value
-from ..tolerances import CLOSURE_RESIDUAL_TOL, LOOP_SINGULAR_VALUE_MIN
+from ..tolerances import CLOSURE_RESIDUAL_TOL
 from .pinocchio_model import PinocchioModel
+
+LOOP_SINGULAR_VALUE_MIN = 1e-5
+"""Smallest scale of the loop Jacobian's singular values (characteristic lengths, radians)."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -29,6 +32,8 @@ class ClosedConfiguration(Value):
     model: PinocchioModel
     q: Array
     residual: float
+    line: str | None = None
+    """Whether the straight line of the joint coordinates that led here from zero is proved to; None without one."""
 
     @classmethod
     def of(cls, model: PinocchioModel, q: Array, tolerance: float = CLOSURE_RESIDUAL_TOL) -> ClosedConfiguration:

@@ -7,16 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..budgets import POSE_PATH_STEP_MAX
 from ..geometry.ranks import compute_kernel_basis, compute_range_basis
 from ..geometry.vectors import Array
+from ..solving.gauss_newton import UNDAMPED, Residual, descend
 from ..tolerances import (
     CLOSURE_RESIDUAL_TOL,
     CLOSURE_SOLVER_TOL,
-    FOLD_SINGULAR_VALUE_TOL,
-    GOAL_DIRECTION_CUTOFF_FRACTION,
     HIDDEN_ROBOT_RESIDUAL_TOL,
-    NEAREST_POSE_GRADIENT_TOL,
     PRINTED_POSE_TOL,
     RANK_CUTOFF_FRACTION,
     WAYPOINT_RESIDUAL_TOL,
@@ -27,6 +24,15 @@ from .limits import list_tilts_beyond
 from .pinocchio_model import PinocchioModel
 from .platform_motion import PlatformMotion, PoseTask
 from .tasks import GuidedTask, Task, shorten_step, solve, stack_task
+
+NEAREST_POSE_GRADIENT_TOL = 1e-10
+"""Projected gradient (characteristic lengths, radians) at which a pose counts as the nearest one."""
+GOAL_DIRECTION_CUTOFF_FRACTION = 1e-3
+"""Relative singular value below which a direction is not used to bypass a blocked straight path."""
+FOLD_SINGULAR_VALUE_TOL = 1e-5
+"""Relative singular value of loops and goal below which a fold is searched."""
+POSE_PATH_STEP_MAX = 0.3
+"""Largest change of a coordinate per step on the path to a pose (characteristic lengths, radians)."""
 
 CONTINUATION_STEP_MAX = 0.1
 """Longest step along the path to a pose (characteristic lengths, radians)."""
@@ -216,15 +222,13 @@ def _approach_task(
 def polish(here: ClosedConfiguration, goal: GuidedTask) -> ClosedConfiguration:
     """Make Newton steps of minimum norm until the residual no longer falls: on the edge of the workspace a
     configuration is only as exact as the square root of its residual."""
-    model, q = here.model, here.q
-    error, rows = stack_task(model, q, goal)
-    for _ in range(20):
-        step = np.linalg.lstsq(rows, -error, rcond=HIDDEN_ROBOT_RESIDUAL_TOL)[0]
-        trial = model.integrate(q, np.asarray(step, dtype=float))
-        trial_error, trial_rows = stack_task(model, trial, goal)
-        if not np.linalg.norm(trial_error) < 0.9 * np.linalg.norm(error):
-            break
-        q, error, rows = trial, trial_error, trial_rows
+    model = here.model
+
+    def advance(q: Array, at: Residual, factor: float) -> Array:
+        step = np.linalg.lstsq(at.J, -at.error, rcond=HIDDEN_ROBOT_RESIDUAL_TOL)[0]
+        return model.integrate(q, np.asarray(step, dtype=float))
+
+    q, _ = descend(here.q, lambda q: stack_task(model, q, goal), advance, UNDAMPED, 20, lambda at: at.size == 0.0)
     return ClosedConfiguration.of(model, _find_fold(model, q, goal))
 
 

@@ -12,17 +12,21 @@ from itertools import combinations
 
 import numpy as np
 
-from ..budgets import SLIDER_RANGE_FRACTION
 from ..geometry.screws import compute_point_velocity
 from ..geometry.so3 import compute_rotation_vector_rate, convert_rotations_to_vectors, turn_about, wrap_angle
 from ..geometry.vectors import Array, orient_axis
 from ..results import Value
-from ..tolerances import DIRECTION_SINE_TOL, SLIDER_SPAN_MIN_FRACTION
+from ..tolerances import DIRECTION_SINE_TOL
 from .configuration import ClosedConfiguration
 from .continuation import track
 from .pinocchio_model import PinocchioModel
 from .platform_motion import PlatformMotion
 from .velocity_relation import ObservationModel, compute_relation
+
+SLIDER_SPAN_MIN_FRACTION = 1e-3
+"""Fraction of its span below which the travel of a slider of the view counts as zero."""
+SLIDER_RANGE_FRACTION = 0.98
+"""Fraction of the travel of a slider of the view that is used."""
 
 NAMES = ("x", "y", "z", "turn about x", "turn about y", "turn about z")
 COORDINATE_INDEPENDENCE_FRACTION = 0.5

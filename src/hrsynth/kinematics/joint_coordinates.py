@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +19,8 @@ from ..errors import BadRequest, LoopClosureFailure, PoseReachFailure
 from ..geometry.ranks import compute_range_basis
 from ..geometry.vectors import Array
 from ..mechanism import Joint, JointType, Mechanism
-from ..mechanism.pose import JointPose
-from ..records import Record, recorded
+from ..mechanism.pose import JointPose, format_coordinates
+from ..records import OPTIONAL, Record, recorded
 from ..results import Value
 from ..tolerances import CLOSURE_RESIDUAL_TOL, CLOSURE_SOLVER_TOL, POINT_DISTANCE_TOL, PRINTED_POSE_TOL
 from .assembly import build_from_link_poses
@@ -118,23 +119,42 @@ class JointAim(Value):
         return self if fraction == 1 else replace(self, values=self.begun + fraction * (self.values - self.begun))
 
 
-def track_to_joints(start: ClosedConfiguration, motion: PlatformMotion, asked: JointPose) -> ClosedConfiguration:
+@dataclass(frozen=True, eq=False, repr=False)
+class JointLine(Value):
+    """A straight line of independent coordinates (a joint and the number of its ``axes``) by ``reach`` (characteristic
+    lengths, radians), with the configurations that small steps reach, in the file's joints, at ``fractions`` of it."""
+
+    axes: tuple[tuple[str, int], ...]
+    reach: Array
+    fractions: Array
+    steps: tuple[ClosedConfiguration, ...]
+
+    def measure_weakest(self, number: int) -> float:
+        """Return the smallest singular value of the line's coordinates by the motions of the mechanism at a step."""
+        here = self.steps[number]
+        places = [here.model.coordinates[joint][axis] for joint, axis in self.axes]
+        return float(np.linalg.svd(here.kernel()[0][places], compute_uv=False).min(initial=np.inf))
+
+
+def track_to_joints(
+    start: ClosedConfiguration, motion: PlatformMotion, asked: JointPose
+) -> tuple[ClosedConfiguration, JointLine]:
     """Return the configuration with these coordinates that small steps reach from the zero configuration ``start`` on
-    its branch, all joints within their limits; coordinates that depend on others must agree with them.
+    its branch, all joints within their limits, and the line; coordinates that depend on others must agree with them.
 
     Raises ``BadRequest`` for unknown joints, their number and values beyond limits, ``PoseReachFailure`` if the path
     ends before, with the joint that stops it."""
     home, name = convert_to_file_joints(start), start.model.mechanism.name
     if home is None:
         raise PoseReachFailure(name, str(asked), 0.0, "", reason="the file's joints do not fit its normal form")
-    found = _lead(home, motion, _convert_requested(home, asked), asked)
+    found, line = _lead(home, motion, _convert_requested(home, asked), asked)
     if home is start:
-        return found
+        return found, line
     try:
         at = build_from_link_poses(start.model, found.pose)
         turns = _convert_step(home.model, found.q, start.model) - _convert_step(start.model, at.q, start.model)
         whole = 2 * np.pi * np.round(np.round(turns, 3) / (2 * np.pi))
-        return ClosedConfiguration.of(at.model, at.model.integrate(at.q, whole))
+        return ClosedConfiguration.of(at.model, at.model.integrate(at.q, whole)), line
     except LoopClosureFailure as error:
         raise PoseReachFailure(name, str(asked), 1.0, "", reason=f"in normal form: {error}") from None
 
@@ -178,13 +198,13 @@ def _convert_requested(home: ClosedConfiguration, asked: JointPose) -> dict[str,
 
 def _lead(
     home: ClosedConfiguration, motion: PlatformMotion, wanted: Mapping[str, tuple[float, ...]], asked: JointPose
-) -> ClosedConfiguration:
+) -> tuple[ClosedConfiguration, JointLine]:
     """Follow steps from the zero configuration to coordinates, as many of them at a time as are independent."""
     from scipy.linalg import qr
 
     model, robot = home.model, home.model.mechanism
     joints = [robot.joints[name] for name in wanted]
-    names = [joint.name for joint in joints for _ in range(joint.type.freedoms)]
+    axes = [(joint.name, axis) for joint in joints for axis in range(joint.type.freedoms)]
     places = np.array([i for joint in joints for i in model.coordinates[joint.name]])
     values = np.concatenate(
         [(wanted[each.name] - _compute_offset(each)) / _list_units(each, model.length) for each in joints]
@@ -205,28 +225,32 @@ def _lead(
 
     def refuse(stopped: str) -> PoseReachFailure:
         told = read_joints(here)
-        last = ",".join(f"{joint}={'/'.join(f'{x:.6g}' for x in told[joint])}" for joint in wanted)
-        way = f"; the robot follows {100 * came:.3g} % of the path from its zero configuration" * (came < 1)
+        last = ",".join(f"{joint}={format_coordinates(told[joint])}" for joint in wanted)
+        way = f"; the robot follows {100 * came:.3g} % of the path from its zero configuration, to {last}" * (came < 1)
         return PoseReachFailure(robot.name, str(asked), came, f"{asked.kind}:{last}", reason=stopped + way)
 
-    goal = values[free]
+    goal, steps = values[free], [(0.0, home)]
     pieces = max(1, int(np.ceil(np.linalg.norm(goal - at_zero[places[free]]) / CONTINUATION_STEP_MAX)))
     for number, ends in enumerate(pairwise(np.linspace(at_zero[places[free]], goal, pieces + 1))):
         there, part = track(here, motion, JointAim(places[free], *ends), home=rest)
         if over := past(there):
             raise refuse(f"{min(over, key=lambda joint: over[joint])} is at its limit")
         here, came = there, (number + part) / pieces
+        steps.append((came, here))
         if part < 1:
-            J = np.eye(model.nv)[places[free]] @ here.kernel()[0]
-            held = names[free[np.argmax(np.abs(np.linalg.svd(J)[0][:, -1]))]]
-            raise refuse(f"a singularity lies ahead, at which {held} stops")
+            sides, strengths, _ = np.linalg.svd(np.eye(model.nv)[places[free]] @ here.kernel()[0])
+            held, least = axes[free[np.argmax(np.abs(sides[:, -1]))]][0], strengths.min()
+            raise refuse(f"a singularity lies ahead, at which {held} stops (least singular value {least:.2g})")
     missed = np.abs(model.difference(model.q0, here.q)[places] - values)
     if missed.max() > PRINTED_POSE_TOL:
-        joint = names[int(np.argmax(missed))]
-        told = "/".join(f"{x:.6g}" for x in read_joints(here)[joint])
-        raise refuse(f"with the other coordinates fixed {joint} is {told}")
+        joint = axes[int(np.argmax(missed))][0]
+        value = format_coordinates(read_joints(here)[joint])
+        raise refuse(f"with the other coordinates fixed {joint} is {value}")
     there = find_nearest(here, JointAim(places[free], goal, goal), rest)
-    return here if past(there) else there
+    steps[-1] = 1.0, here if past(there) else there
+    fractions, passed = zip(*steps, strict=True)
+    line = JointLine(tuple(axes[i] for i in free), goal - at_zero[places[free]], np.array(fractions), passed)
+    return passed[-1], line
 
 
 Told = dict[str, float | tuple[float, ...]]
@@ -240,6 +264,11 @@ class FileCoordinates(Record, all_recorded=True):
 
     motors: Told
     joints: Told
+    line: Annotated[
+        str | None,
+        OPTIONAL,
+        "of a pose by motors or joints: proved if their straight line from zero leads here with one continuation",
+    ] = None
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {len(self.motors)} motors, {len(self.joints)} other joints>"
@@ -250,7 +279,7 @@ class FileCoordinates(Record, all_recorded=True):
         robot = at.model.mechanism.written or at.model.mechanism
         found = {name: each[0] if len(each) == 1 else each for name, each in read_joints(at).items()}
         driven = {name: value for name, value in found.items() if robot.joints[name].is_actuated}
-        return cls(driven, {name: value for name, value in found.items() if name not in driven})
+        return cls(driven, {name: value for name, value in found.items() if name not in driven}, at.line)
 
 
 class OfConfiguration:

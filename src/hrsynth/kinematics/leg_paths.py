@@ -43,16 +43,6 @@ class MotionFactor:
     limit: TiltLimit | None = None
 
     @property
-    def is_spherical(self) -> bool:
-        """True if it rotates about a point."""
-        return self.axis is None
-
-    @property
-    def is_rotation(self) -> bool:
-        """True if it rotates about one axis."""
-        return self.axis is not None and not self.slides
-
-    @property
     def direction(self) -> Field:
         """Axis, to be multiplied by balls."""
         assert self.axis is not None

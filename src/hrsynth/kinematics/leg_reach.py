@@ -8,17 +8,16 @@ from itertools import pairwise
 import numpy as np
 
 from ..errors import HrsynthError, LegMiss
-from ..geometry.gauss_newton import DampingFactor, Residual, descend
 from ..geometry.ranks import compute_kernel_basis
 from ..geometry.vectors import Array, invert_pose, transform
 from ..mechanism import JointType, Mechanism
 from ..mechanism.graphs import build_adjacency, find_shortest_path
 from ..mechanism.legs import Leg, LegDecomposition, decompose
+from ..solving.gauss_newton import DampingFactor, Residual, descend
 from ..tolerances import (
     CLOSURE_RESIDUAL_TOL,
     CLOSURE_SOLVER_TOL,
     HIDDEN_ROBOT_RESIDUAL_TOL,
-    LEG_PROGRESS_MIN_FRACTION,
     PRINTED_POSE_TOL,
     RANK_CUTOFF_FRACTION,
 )
@@ -26,6 +25,9 @@ from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
 from .platform_motion import PlatformMotion, PoseTask
 from .tasks import solve
+
+LEG_PROGRESS_MIN_FRACTION = 1e-9
+"""Smallest relative progress of a leg toward a goal over some steps; below it the leg stops."""
 
 LEG_PATH_POINTS_COUNT = 10
 """Number of points of the path along which a leg alone is led towards a pose, so that it keeps its working mode."""

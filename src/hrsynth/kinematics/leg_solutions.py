@@ -132,7 +132,7 @@ def _solve_from_first(way: Sequence[MotionFactor], end: LegEnd) -> LegSolutions:
     if len(way) not in (2, 3) or way[-1].slides:
         return UNDECIDED
     first, last = way[0], way[-1]
-    moving = way[1] if len(way) == 3 and not way[1].is_spherical else None
+    moving = way[1] if len(way) == 3 and way[1].axis is not None else None
     far = [last.point] if last.axis is None else [last.point, last.point + end.length * last.axis]
     targets = [end.target(x) for x in far]
     if len(way) == 2 or moving is not None:

@@ -34,14 +34,15 @@ class _Bodies:
         self.place = {link: i for i, link in enumerate(links)}
         pose = cache(at.pose)
         self.A = build_constraint_matrix(joints, self.place, lambda joint: locate_joint(at, joint, pose))
-        gears = [each for each in at.model.mechanism.couplings if {each.predecessor, each.successor} <= {*links}]
+        names = {joint.name for joint in joints}
+        gears = [each for each in at.model.mechanism.couplings if {each.driver, each.driven} <= names]
         self.A = np.vstack([self.A, *(self._coupling_row(each, pose) for each in gears)])
 
     def _coupling_row(self, coupling: Coupling, pose: Callable[[str], Array]) -> Array:
-        """A coupling's row: the successor's rate less ratio × the predecessor's (metres, radians)."""
-        row, mechanism = np.zeros((1, 6 * len(self.place))), self.at.model.mechanism
-        for link, factor in ((coupling.successor, 1.0), (coupling.predecessor, -coupling.ratio)):
-            joint = mechanism.carrier(coupling, link)
+        """A coupling's row: the driven joint's rate less ratio × the driver's (metres, radians)."""
+        row = np.zeros((1, 6 * len(self.place)))
+        for name, factor in ((coupling.driven, 1.0), (coupling.driver, -coupling.ratio)):
+            joint = self.at.model.mechanism.joints[name]
             (axis,), slides = locate_joint(self.at, joint, pose)[1], joint.type.has_translation
             part = np.r_[axis * self.at.model.length, 0 * axis] if slides else np.r_[0 * axis, axis]
             for end, sign in ((joint.successor, factor), (joint.predecessor, -factor)):

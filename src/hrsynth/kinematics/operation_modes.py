@@ -16,19 +16,23 @@ from ..tolerances import (
     CLOSURE_RESIDUAL_TOL,
     CLOSURE_SOLVER_TOL,
     EXACT_INCIDENCE_TOL,
-    FIRST_ORDER_STEP_MAX,
-    FIRST_ORDER_STEP_MIN_FRACTION,
     NONZERO_SINGULAR_VALUE_MIN,
     RANK_GAP_MIN,
     SINGULAR_POSE_RESIDUAL_TOL,
     SLOPE_STEP_MAX,
-    TANGENT_ROTATION_TOL,
 )
 from .branch_tests import OperationMode, Signature, group_modes
 from .configuration import ClosedConfiguration
 from .tasks import TaskBatch, solve, solve_together
 from .velocity_relation import ObservationModel, compute_relation
 from .walking import HALVED, draw_velocity, step_along, walk_randomly
+
+TANGENT_ROTATION_TOL = 1e-10
+"""Turn (radians) of the tangent space that the residual of a sample may cause."""
+FIRST_ORDER_STEP_MIN_FRACTION = 0.5
+"""Fraction of a small first-order step that must remain after closing; less is no finite motion."""
+FIRST_ORDER_STEP_MAX = 0.01
+"""Length of such a step (characteristic lengths, radians)."""
 
 MODE_CANDIDATES_MAX = 40
 """Largest number of configurations beyond a singularity that are tested for another operation mode."""

@@ -218,8 +218,8 @@ class _Export:
         """Return one row a coupling: the driven joint's rate − ratio × the driving one's."""
         rows = np.zeros((len(self._robot.couplings), self._model.nv))
         for row, coupling in zip(rows, self._robot.couplings, strict=True):
-            for link, factor in ((coupling.successor, 1.0), (coupling.predecessor, -coupling.ratio)):
-                row[self._start(self._robot.carrier(coupling, link).name)[1]] += factor
+            for name, factor in ((coupling.driven, 1.0), (coupling.driver, -coupling.ratio)):
+                row[self._start(name)[1]] += factor
         return rows
 
 

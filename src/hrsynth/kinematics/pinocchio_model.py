@@ -14,7 +14,6 @@ from functools import cached_property
 import numpy as np
 import pinocchio as pin
 
-from ..budgets import MODEL_COORDINATES_MAX
 from ..errors import BadMechanism, BadRequest
 from ..geometry.so3 import convert_rotations_to_vectors, decompose_rotation
 from ..geometry.vectors import Array, invert_pose, transform
@@ -23,8 +22,10 @@ from ..mechanism.screws import split_elementary
 from ..tolerances import GEOMETRY_DIFFERENCE_TOL
 from .loop_rows import LoopRows, Places, read_numbers
 
+MODEL_COORDINATES_MAX = 256
+"""Coordinates above which a mechanism is refused: Pinocchio's data hold several cubes of their number."""
+
 _UPRIGHT = np.eye(3)
-_WEIGHT = {"F": 0, "R": 1, "P": 1, "C": 2, "U": 2, "E": 3, "S": 4, "6": 100}
 
 
 class PinocchioModel:
@@ -41,7 +42,8 @@ class PinocchioModel:
         self._parts: list[tuple[Joint, str, tuple[str, ...]]] = []
         tree, loops = self._span()
         for joint, parent in tree:
-            self._add_tree(joint, parent)
+            still = joint.type is JointType.FIXED
+            self._body[joint.other(parent)] = self._body[parent] if still else self._add(joint, parent, "")
         ends = [self._loop(joint) for joint in loops]
         self.spanned = tuple(joint for joint, _ in tree), tuple(loops)
         """Joints of the tree, from the base outwards, and those at which loops are cut."""
@@ -107,9 +109,9 @@ class PinocchioModel:
 
     def _span(self) -> tuple[list[tuple[Joint, str]], list[Joint]]:
         mechanism = self.mechanism
-        geared = {link for c in mechanism.couplings for link in (c.predecessor, c.successor)}
         joints = [joint for joint in mechanism.joints.values() if joint.name not in mechanism.idle]
-        weights = [_WEIGHT[joint.type.value] - (0.5 if joint.successor in geared else 0) for joint in joints]
+        coupled = mechanism.coupled_joints
+        weights = [(joint.type.freedoms, joint.name not in coupled) for joint in joints]
         tree = graphs.build_spanning_forest(mechanism.links, joints, weights)
         ordered = [(joint, parent) for joint, parent, _ in graphs.order_outward(mechanism.base, tree)]
         if len(ordered) != len(mechanism.links) - 1:
@@ -165,10 +167,6 @@ class PinocchioModel:
         self.coordinates[joint.name] = tuple(reversed(span)) if swapped else tuple(span)
         return index
 
-    def _add_tree(self, joint: Joint, parent: str) -> None:
-        child = joint.other(parent)
-        self._body[child] = self._body[parent] if joint.type is JointType.FIXED else self._add(joint, parent, "")
-
     def _loop(self, joint: Joint) -> tuple[int, int, bool]:
         """The two frames of a loop, and whether a ball holds their points together: one that no motor turns."""
         near, far = (self._body[link] for link in joint.links)
@@ -187,13 +185,12 @@ class PinocchioModel:
         return first, second, ball
 
     def _gear_rows(self) -> Array:
-        """One row a coupling: successor's rate − ratio × predecessor's rate (metres, radians)."""
+        """One row a coupling: the driven joint's rate − ratio × the driver's (metres, radians)."""
         rows = np.zeros((len(self.mechanism.couplings), self.model.nv))
         for row, coupling in zip(rows, self.mechanism.couplings, strict=True):
-            for link, factor in ((coupling.successor, 1.0), (coupling.predecessor, -coupling.ratio)):
-                carrier = self.mechanism.carrier(coupling, link)
-                unit = self.length if carrier.type is JointType.PRISMATIC else 1.0
-                row[self.coordinates[carrier.name][0]] += factor * unit
+            for name, factor in ((coupling.driven, 1.0), (coupling.driver, -coupling.ratio)):
+                unit = self.length if self.mechanism.joints[name].type is JointType.PRISMATIC else 1.0
+                row[self.coordinates[name][0]] += factor * unit
         return rows
 
     def parts(self) -> list[tuple[Joint, str, tuple[str, ...]]]:
@@ -215,7 +212,7 @@ class PinocchioModel:
     def residual(self, q: Array) -> Array:
         """Loop residuals, stacked in the order of ``loops`` (characteristic lengths, radians)."""
         self.at(q)
-        errors = self._rows.residual(self._rows.numbers, self._rows.errors())
+        errors = self._rows.residual()
         return np.concatenate([errors, self._gear_errors(q)]) if self._geared else errors
 
     def _gear_errors(self, q: Array) -> Array:
@@ -227,7 +224,7 @@ class PinocchioModel:
         return dict(zip((each.name for each in self.mechanism.couplings), self._gear_errors(q).tolist(), strict=True))
 
     def jacobian(self, q: Array) -> Array:
-        """The derivative of :meth:`compute_closure_residual` at closure, shape (rows, nv)."""
+        """The derivative of :meth:`residual` at closure, shape (rows, nv)."""
         self.at(q)
         J = self._rows.jacobian()
         return np.vstack([J, self._gears]) if self._geared else J
@@ -288,25 +285,21 @@ class PinocchioModel:
     def states(
         self, places: Sequence[Array], links: tuple[str, ...], whole: int | None = None
     ) -> tuple[Array, Array, Array, Array]:
-        """Return :meth:`compute_closure_residual` (n, rows), :meth:`jacobian` (n, rows, nv) and
-        :meth:`compute_image_frames` (n, k, 4, 4), (n, k, 6, nv) of several configurations."""
+        """Return :meth:`residual` (n, rows), :meth:`jacobian` (n, rows, nv) and
+        :meth:`frames` (n, k, 4, 4), (n, k, 6, nv) of several configurations."""
         bodies = (self._several.get(links) or self._together(links))[0] if links else np.zeros(0, dtype=np.intp)
-        rows = self._rows
-        numbers, missed, loops, J, X = [], [], [], [], []
+        errors, loops, J, X = [], [], [], []
         for q in places:
+            errors.append(self.residual(q))
             loops.append(self.jacobian(q))
-            numbers.append(rows.numbers.copy())
-            missed.append(rows.errors())
             if links:
                 J.append(self._screws.copy())
                 X.append(self._placements.take(bodies, 0))
-        n, errors = len(places), rows.residual(np.array(numbers), np.array(missed))
-        if self._geared:
-            errors = np.hstack([errors, [self._gear_errors(q) for q in places]])
+        n = len(places)
         if not links:
-            return errors, np.array(loops), np.zeros((n, 0, 4, 4)), np.zeros((n, 0, 6, self.nv))
+            return np.array(errors), np.array(loops), np.zeros((n, 0, 4, 4)), np.zeros((n, 0, 6, self.nv))
         poses = self._homogeneous(np.array(X)) @ self._several[links][1]
-        return errors, np.array(loops), poses, self._moving(poses, np.array(J), links, whole)
+        return np.array(errors), np.array(loops), poses, self._moving(poses, np.array(J), links, whole)
 
     def _homogeneous(self, placements: Array) -> Array:
         """The matrices (…, 4, 4), metres, of placements by their numbers (…, 12)."""

@@ -10,12 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
 
-from ..budgets import RETRACE_ITERATIONS_MAX
 from ..errors import BadMechanism, SamplingFailure, UndefinedValue
 from ..geometry.ranks import compute_range_bases
 from ..geometry.vectors import Array
@@ -24,7 +23,6 @@ from ..results import Value
 from ..tolerances import (
     CLOSURE_RESIDUAL_TOL,
     CLOSURE_SOLVER_TOL,
-    FEASIBLE_MOTION_MIN_FRACTION,
     HIDDEN_ROBOT_RESIDUAL_TOL,
     NONZERO_SINGULAR_VALUE_MIN,
     PSEUDOINVERSE_CUTOFF_FRACTION,
@@ -46,8 +44,15 @@ from .operation_modes import (
 )
 from .path_tracking import track_paths
 from .pinocchio_model import PinocchioModel
+from .platform_motion import PlatformMotion
 from .tasks import PoseAndValuesTask, TaskBatch, shorten_step, solve_together
-from .velocity_relation import ObservationModel, VelocityRelation, compute_relation, compute_relations
+from .velocity_relation import (
+    ObservationModel,
+    VelocityRelation,
+    compute_relation,
+    compute_relations,
+    select_observations,
+)
 from .walking import (
     HALVED,
     WALK_SINGULAR_VALUE_MIN_FRACTION,
@@ -56,6 +61,11 @@ from .walking import (
     is_step_on_branch,
     step_along,
 )
+
+FEASIBLE_MOTION_MIN_FRACTION = 1e-6
+"""Relative length of (t, u̇) below which a mechanism cannot move in a direction."""
+RETRACE_ITERATIONS_MAX = 10
+"""Iterations within which a retraced sample must close; more indicate a fold."""
 
 X = TypeVar("X")
 
@@ -93,6 +103,35 @@ class Samples(Value):
     other_modes: tuple[OperationMode, ...] = ()
     led: bool = True
     """True if the robot finds all samples again, led along their paths: not if its zero configuration is special."""
+
+    @cached_property
+    def motion(self) -> PlatformMotion:
+        """Generic motion of the platform."""
+        return PlatformMotion.of([member.configuration for member in self.members], self.observation_model)
+
+    def restrict(self, observations: Iterable[Observation], *, ways: bool = True) -> Samples:
+        """Return the samples for fewer observations (all of them among the samples' own), with or without their
+        ``ways``."""
+        keys = [o.key for o in self.observation_model.observations]
+        places = [keys.index(o.key) for o in observations]
+        chosen = tuple(self.observation_model.observations[i] for i in places)
+        relations = select_observations([member.relation for member in self.members], places)
+        members = tuple(
+            Sample(
+                member.configuration,
+                tuple(replace(t, measured=tuple(t.measured[i] for i in places)) for t in member.way) if ways else (),
+                relation,
+            )
+            for member, relation in zip(self.members, relations, strict=True)
+        )
+        return replace(self, observation_model=replace(self.observation_model, observations=chosen), members=members)
+
+    def measure(self, observations: tuple[Observation, ...]) -> Samples:
+        """Return the samples with ρ for other observations, without paths."""
+        observation_model = replace(self.observation_model, observations=observations)
+        places = [member.configuration for member in self.members]
+        members = tuple(Sample(at, (), compute_relation(at, observation_model)) for at in places)
+        return replace(self, observation_model=observation_model, members=members)
 
     @property
     def mobility(self) -> int:
@@ -156,48 +195,45 @@ def sample(
 
 
 @dataclass(eq=False)
-class _Walker:
-    """Random walk: its configuration, its last direction in (t, u̇), the configurations of its last step, the targets
-    of all that it passed, the random vectors that it takes first, and the least singular value allowed."""
+class _RandomWalk:
+    """Random walk: its configuration, the random vectors that it takes first, the least singular value allowed, its
+    last direction in (t, u̇), the targets of all configurations that it passed, and its step in progress."""
 
     here: ClosedConfiguration
     noise: Iterator[Array]
     weakest: float
     wish: Array | None = None
-    passed: Sequence[ClosedConfiguration] = ()
     way: list[PoseAndValuesTask | None] = field(default_factory=list)
-
-
-@dataclass(frozen=True, eq=False)
-class _Stride:
-    """Step in progress: the configuration reached, the joint velocity there and its (t, u̇), the part of it that is
-    done and the next part, and the configurations passed."""
-
-    here: ClosedConfiguration
-    velocity: Array
-    direction: Array
-    came: float = 0.0
+    passed: list[ClosedConfiguration] = field(default_factory=list)
+    """Configurations passed in the step."""
+    velocity: Array = field(init=False)
+    """Joint velocity at the last of them, and ``direction``, its (t, u̇)."""
+    direction: Array = field(init=False)
+    done: float = 0.0
+    """Fraction of the step that is done; ``part`` is that of the next part."""
     part: float = 1.0
-    passed: tuple[ClosedConfiguration, ...] = ()
+
+    def begin(self) -> None:
+        """Begin a step."""
+        self.passed, self.done, self.part = [], 0.0, 1.0
+
+    @property
+    def at(self) -> ClosedConfiguration:
+        """Configuration that the step has reached."""
+        return self.passed[-1] if self.passed else self.here
 
     def tangent(self) -> Array:
-        """Next part of it, (nv,)."""
+        """Return the next part of the step, (nv,)."""
         return self.part * shorten_step(WALK_STEP_NORM_FRACTION * self.velocity, 3 * WALK_STEP_NORM_FRACTION)
 
-    def shortened(self) -> _Stride | None:
-        """Return the step with its next part halved, which did not follow the branch; None if it would be too small."""
-        return replace(self, part=self.part / 2) if self.part / 2 >= HALVED[-1] else None
-
-    def ahead(self) -> _Stride | None:
-        """Return the step with a next part that may follow the branch, which is tested before it is closed."""
-        if has_steady_values_along(self.here, self.tangent()):
-            return self
-        shorter = self.shortened()
-        return shorter and shorter.ahead()
-
-    def on(self, basis: Array) -> Array:
-        """Return its direction in a basis of (t, u̇)."""
-        return np.asarray(basis.T @ self.direction)
+    def can_go_on(self) -> bool:
+        """Halve the next part until it may follow the branch, which is tested before it is closed; False if it gets too
+        small."""
+        while self.part >= HALVED[-1]:
+            if has_steady_values_along(self.at, self.tangent()):
+                return True
+            self.part /= 2
+        return False
 
 
 class _Walks:
@@ -238,28 +274,28 @@ class _Walks:
         blocked, or whose ranks are not clear."""
         observation_model = self.question
         noise = self.rng.normal(size=(len(starts), SAMPLE_PATH_STEPS_COUNT + 1, observation_model.size))
-        walkers = [
-            _Walker(start, iter(own), WALK_SINGULAR_VALUE_MIN_FRACTION * start.kernel()[1].weakest)
-            for start, own in zip(starts, noise, strict=True)
+        walks = [
+            _RandomWalk(start, iter(vectors), WALK_SINGULAR_VALUE_MIN_FRACTION * start.kernel()[1].weakest)
+            for start, vectors in zip(starts, noise, strict=True)
         ]
         for _ in range(SAMPLE_PATH_STEPS_COUNT):
             if self.freely:
-                for walker in walkers:
-                    idly = 2 * draw_velocity(walker.here, self.rng)
-                    walker.here = next(
-                        (there for part in HALVED if (there := step_along(walker.here, idly, part)) is not None),
-                        walker.here,
+                for walk in walks:
+                    idly = 2 * draw_velocity(walk.here, self.rng)
+                    walk.here = next(
+                        (there for part in HALVED if (there := step_along(walk.here, idly, part)) is not None),
+                        walk.here,
                     )
-            walkers = self._step(walkers)
-            passed = [(walker, at) for walker in walkers for at in walker.passed]
+            walks = self._step(walks)
+            passed = [(walk, at) for walk in walks for at in walk.passed]
             targets = _measure_all(observation_model.targets, [at for _, at in passed])
-            for (walker, _), target in zip(passed, targets, strict=True):
-                walker.way.append(target)
-            walkers = [walker for walker in walkers if None not in walker.way]
+            for (walk, _), target in zip(passed, targets, strict=True):
+                walk.way.append(target)
+            walks = [walk for walk in walks if None not in walk.way]
         steady = [
-            (at, [each for each in walker.way if each is not None])
-            for walker in walkers
-            if (at := close_precisely(walker.here)) is not None
+            (at, [each for each in walk.way if each is not None])
+            for walk in walks
+            if (at := close_precisely(walk.here)) is not None
         ]
         found = _measure_all(
             lambda at: compute_relations(at, observation_model, observation_model.rows_together(at)),
@@ -271,101 +307,81 @@ class _Walks:
             if each is not None and each.gap >= RANK_GAP_MIN
         ]
 
-    def _step(self, walkers: Sequence[_Walker]) -> list[_Walker]:
+    def _step(self, walks: Sequence[_RandomWalk]) -> list[_RandomWalk]:
         """Make one step of each, in another direction if it is blocked; return those that were not blocked in all."""
-        left = list(walkers)
+        left = list(walks)
         for _ in range(WALK_DIRECTIONS_MAX):
-            if not left:
-                break
-            aims = self._velocities([walker.here for walker in left], [partial(self._aim, walker) for walker in left])
-            ends = self._stride(
-                {
-                    i: _Stride(walker.here, *aim)
-                    for i, (walker, aim) in enumerate(zip(left, aims, strict=True))
-                    if aim is not None
-                },
-                [walker.weakest for walker in left],
-            )
-            for i, (passed, direction) in ends.items():
-                left[i].here, left[i].wish, left[i].passed = passed[-1], direction, passed
-            left = [walker for i, walker in enumerate(left) if i not in ends]
-            for walker in left:
-                walker.wish = None
-        return [walker for walker in walkers if walker not in left]
+            for walk in left:
+                walk.begin()
+            ended = self._stride(self._turn(left, self._aim))
+            for walk in ended:
+                walk.here, walk.wish = walk.at, walk.direction
+            left = [walk for walk in left if walk not in ended]
+            for walk in left:
+                walk.wish = None
+        return [walk for walk in walks if walk not in left]
 
-    def _aim(self, walker: _Walker, basis: Array) -> Array:
+    def _aim(self, walk: _RandomWalk, basis: Array) -> Array:
         """Return the next direction, in this basis of (t, u̇): near the last one, or anywhere."""
 
         def noise() -> Array:
-            drawn = next(walker.noise, None)
+            drawn = next(walk.noise, None)
             return np.asarray(self.rng.normal(size=len(basis))) if drawn is None else drawn
 
-        wish = noise() if walker.wish is None else walker.wish
+        wish = noise() if walk.wish is None else walk.wish
         return np.asarray(basis.T @ (wish + 0.2 * noise() / np.sqrt(basis.shape[1])))
 
-    def _velocities(
-        self, here: Sequence[ClosedConfiguration], aims: Sequence[Callable[[Array], Array]]
-    ) -> list[tuple[Array, Array] | None]:
-        """Return a joint velocity without internal motion at each configuration, whose (t, u̇) is a unit vector, and
-        this vector: along the projection of its aim on a basis; None if nothing moves so."""
-        rows = _measure_all(self.question.rows_together, here)
-        images = {i: moved @ here[i].kernel()[0] for i, moved in enumerate(rows) if moved is not None}
-        found: list[tuple[Array, Array] | None] = [None] * len(here)
-        for (i, image), (basis, rank) in zip(
-            images.items(), compute_range_bases(list(images.values()), 1.0), strict=True
-        ):
-            wanted = basis @ aims[i](basis) if rank.value else np.zeros(len(image))
+    def _turn(self, walks: Sequence[_RandomWalk], aim: Callable[[_RandomWalk, Array], Array]) -> list[_RandomWalk]:
+        """Give each a joint velocity without internal motion, whose (t, u̇) is a unit vector: along the projection of
+        its aim on a basis; return those that can move so."""
+        rows = _measure_all(self.question.rows_together, [walk.at for walk in walks])
+        images = [
+            (walk, moved @ walk.at.kernel()[0]) for walk, moved in zip(walks, rows, strict=True) if moved is not None
+        ]
+        bases = compute_range_bases([image for _, image in images], 1.0)
+        turned = []
+        for (walk, image), (basis, rank) in zip(images, bases, strict=True):
+            wanted = basis @ aim(walk, basis) if rank.value else np.zeros(len(image))
             norm = float(np.linalg.norm(wanted))
             if norm >= FEASIBLE_MOTION_MIN_FRACTION:
-                wanted = wanted / norm
-                found[i] = (
-                    here[i].kernel()[0] @ np.linalg.lstsq(image, wanted, rcond=PSEUDOINVERSE_CUTOFF_FRACTION)[0],
-                    wanted,
-                )
-        return found
+                walk.direction = wanted / norm
+                rates = np.linalg.lstsq(image, walk.direction, rcond=PSEUDOINVERSE_CUTOFF_FRACTION)[0]
+                walk.velocity = walk.at.kernel()[0] @ rates
+                turned.append(walk)
+        return turned
 
-    def _stride(
-        self, going: dict[int, _Stride], weakest: Sequence[float]
-    ) -> dict[int, tuple[tuple[ClosedConfiguration, ...], Array]]:
-        """Return the configurations to which steps along (t, u̇) lead, in parts that follow the branch, and their last
-        directions; without those that come too near to a singularity of the loops."""
-        ended: dict[int, tuple[tuple[ClosedConfiguration, ...], Array]] = {}
+    def _stride(self, walks: Sequence[_RandomWalk]) -> list[_RandomWalk]:
+        """Make a step of each along its (t, u̇), in parts that follow the branch; return those that end theirs, without
+        those that come too near to a singularity of the loops."""
+        ended, going = list[_RandomWalk](), list(walks)
         while going:
-            onward: dict[int, _Stride] = {}
-            for (i, at), there in zip(going.items(), self._parts(list(going.values())), strict=True):
-                came = at.came + at.part
+            halved, advanced = list[_RandomWalk](), list[_RandomWalk]()
+            for walk, there in zip(going, self._parts(going), strict=True):
                 if there is None:
-                    if (shorter := at.shortened()) is not None:
-                        onward[i] = shorter
-                elif there.kernel()[1].weakest >= weakest[i]:
-                    passed = (*at.passed, there)
-                    if came < 1:
-                        onward[i] = _Stride(there, at.velocity, at.direction, came, min(2 * at.part, 1 - came), passed)
-                    else:
-                        ended[i] = passed, at.direction
-            turned = [i for i, at in onward.items() if at.here is not going[i].here]
-            moving = self._velocities([onward[i].here for i in turned], [onward[i].on for i in turned])
-            for i, each in zip(turned, moving, strict=True):
-                if each is None:
-                    del onward[i]
-                else:
-                    onward[i] = replace(onward[i], velocity=each[0], direction=each[1])
-            going = {i: ahead for i, at in onward.items() if (ahead := at.ahead()) is not None}
+                    walk.part /= 2
+                    halved.append(walk)
+                elif there.kernel()[1].weakest >= walk.weakest:
+                    walk.passed.append(there)
+                    walk.done += walk.part
+                    walk.part = min(2 * walk.part, 1 - walk.done)
+                    (advanced if walk.done < 1 else ended).append(walk)
+            turned = self._turn(advanced, lambda walk, basis: basis.T @ walk.direction)
+            going = [walk for walk in going if walk in halved + turned and walk.can_go_on()]
         return ended
 
-    def _parts(self, strides: Sequence[_Stride]) -> list[ClosedConfiguration | None]:
+    def _parts(self, walks: Sequence[_RandomWalk]) -> list[ClosedConfiguration | None]:
         """Make the next part of several steps, see :func:`.walking.step_along`."""
-        model, tangents = strides[0].here.model, [stride.tangent() for stride in strides]
-        predicted = [model.integrate(stride.here.q, tangent) for stride, tangent in zip(strides, tangents, strict=True)]
-        solved = solve_together(TaskBatch(model, None), predicted, [None] * len(strides), tolerance=CLOSURE_SOLVER_TOL)
+        model, tangents = walks[0].here.model, [walk.tangent() for walk in walks]
+        predicted = [model.integrate(walk.at.q, tangent) for walk, tangent in zip(walks, tangents, strict=True)]
+        solved = solve_together(TaskBatch(model, None), predicted, [None] * len(walks), tolerance=CLOSURE_SOLVER_TOL)
         closed = [k for k, (_, residual) in enumerate(solved) if residual <= CLOSURE_RESIDUAL_TOL]
-        found: list[ClosedConfiguration | None] = [None] * len(strides)
+        parts: list[ClosedConfiguration | None] = [None] * len(walks)
         for k, there in zip(closed, ClosedConfiguration.several(model, [solved[k][0] for k in closed]), strict=True):
-            if is_step_on_branch(strides[k].here, tangents[k], predicted[k], there):
-                found[k] = there
-            elif strides[k].part == 1:
+            if is_step_on_branch(walks[k].at, tangents[k], predicted[k], there):
+                parts[k] = there
+            elif walks[k].part == 1:
                 self.beyond.append(there)
-        return found
+        return parts
 
 
 def _measure_all(

@@ -12,12 +12,13 @@ from typing import Protocol
 
 import numpy as np
 
-from ..geometry.gauss_newton import DampingFactor, Residual, descend, descend_together
 from ..geometry.screws import compute_point_velocity
 from ..geometry.so3 import convert_rotations_to_vectors, convert_vectors_to_rotations
-from ..geometry.vectors import Array
+from ..geometry.vectors import Array, times
 from ..mechanism.observation import Observation
 from ..results import Value
+from ..solving.gauss_newton import DampingFactor, Residual, descend, descend_together
+from ..solving.newton import solve_squares
 from ..tolerances import CLOSURE_RESIDUAL_TOL
 from .configuration import measure, measure_together
 from .pinocchio_model import PinocchioModel
@@ -176,7 +177,7 @@ def solve(
     def advance(q: Array, at: Residual, factor: float) -> Array:
         normal = at.J.T @ at.J
         normal.reshape(-1)[:: model.nv + 1] += max(factor * at.size**2, 1e-14)
-        return model.integrate(q, shorten_step(_solve_damped_step(normal, -(at.J.T @ at.error)), 0.5))
+        return model.integrate(q, shorten_step(solve_squares(normal, -(at.J.T @ at.error)), 0.5))
 
     q, left = descend(
         q, lambda q: stack_task(model, q, task), advance, DAMPING, iterations, lambda at: at.size <= tolerance
@@ -204,11 +205,7 @@ def solve_together(
         normal = J.swapaxes(1, 2) @ J
         damping = [max(factor * at.size**2, 1e-14) for _, at, factor in going.values()]
         normal.reshape(len(J), -1)[:, :: model.nv + 1] += np.array(damping)[:, None]
-        wanted = -(J.swapaxes(1, 2) @ errors[:, :, None])
-        try:
-            steps = np.linalg.solve(normal, wanted)[:, :, 0]
-        except np.linalg.LinAlgError:
-            steps = np.array([_solve_damped_step(*each) for each in zip(normal, wanted[:, :, 0], strict=True)])
+        steps = solve_squares(normal, -times(J.swapaxes(1, 2), errors))
         longest = np.abs(steps).max(axis=1, initial=0.0).tolist()
         return {
             i: model.integrate(q, step if size <= 0.5 else shorten_step(step, 0.5))
@@ -219,14 +216,6 @@ def solve_together(
         (q, left.size)
         for q, left in descend_together(starts, evaluate, advance, DAMPING, iterations, lambda at: at.size <= tolerance)
     ]
-
-
-def _solve_damped_step(normal: Array, wanted: Array) -> Array:
-    """The step of damped normal equations."""
-    try:
-        return np.asarray(np.linalg.solve(normal, wanted), dtype=float)
-    except np.linalg.LinAlgError:  # singular but for rounding, beside which the least damping is nothing
-        return np.asarray(np.linalg.lstsq(normal, wanted)[0], dtype=float)
 
 
 class TaskBatch:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -120,6 +121,15 @@ class ObservationModel(Value):
         return self.twist_rows + sum(self.sizes) + 6 * len(self.bodies)
 
 
+class _UnobservedMotion(NamedTuple):
+    """Motion in ρ that one side of it does not show."""
+
+    twists: Array
+    RO: Rank
+    seen: Rank
+    RI: int
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class VelocityRelation(Value):
     """ρ(q) as an orthonormal basis (rows: t, then measured rates, then bodies), with mobility and the smallest gap."""
@@ -151,6 +161,10 @@ class VelocityRelation(Value):
         start = self.twist_rows + sum(self.sizes[:place])
         return slice(start, start + self.sizes[place])
 
+    def select(self, places: Sequence[int]) -> VelocityRelation:
+        """Return ρ for some of the observations: the projection of ρ for all."""
+        return select_observations([self], places)[0]
+
     @cached_property
     def _platform(self) -> tuple[Array, Rank]:
         return compute_range_basis(self.twist_part, 1.0)
@@ -166,31 +180,28 @@ class VelocityRelation(Value):
         return self._platform[0]
 
     @cached_property
-    def _unseen(self) -> tuple[Array, Rank, Rank]:
-        look([self])
-        found: tuple[Array, Rank, Rank] = self.__dict__["_unseen"]
-        return found
+    def _unobserved(self) -> _UnobservedMotion:
+        return _find_unobserved_motions([self])[0]
 
     @property
     def seen(self) -> Rank:
         """Rank of the measured rates on ρ: it decides which twists are unobserved."""
-        return self._unseen[2]
+        return self._unobserved.seen
 
     @property
     def unobserved_twists(self) -> Array:
         """Basis of {t : (t, 0) ∈ ρ}, the unobserved twists, shape (twist rows, RO)."""
-        return self._unseen[0]
+        return self._unobserved.twists
 
     @property
     def RO(self) -> Rank:
         """RO = dim {t : (t, 0) ∈ ρ}, with its gap."""
-        return self._unseen[1]
+        return self._unobserved.RO
 
-    @cached_property
+    @property
     def RI(self) -> int:
         """RI = dim {u̇ : (0, u̇) ∈ ρ}: where it is not zero, Mᵀ does not exist."""
-        look([self])
-        return int(self.__dict__["RI"])
+        return self._unobserved.RI
 
     @cached_property
     def rank(self) -> int:
@@ -198,16 +209,33 @@ class VelocityRelation(Value):
         return self.dof.value - self.unobserved_twists.shape[1]
 
 
-def look(found: Sequence[VelocityRelation]) -> None:
-    """Decompose several relations together: the unobserved twists of each, and what moves while the platform is
-    fixed."""
-    still = compute_matrix_spectra([each.rates for each in found], 1.0)
-    unseen = compute_range_bases([each.twist_part @ seen.kernel for each, seen in zip(found, still, strict=True)], 1.0)
-    resting = compute_matrix_spectra([each.twist_part for each in found], 1.0)
-    beside = compute_range_bases([each.rates @ at.kernel for each, at in zip(found, resting, strict=True)], 1.0)
-    for each, seen, (basis, rank), (_, free) in zip(found, still, unseen, beside, strict=True):
-        each.__dict__["_unseen"] = basis, Rank(rank.value, min(rank.gap, seen.rank.gap)), seen.rank
-        each.__dict__["RI"] = free.value
+def select_observations(relations: Sequence[VelocityRelation], places: Sequence[int]) -> list[VelocityRelation]:
+    """Return several ρ for some of the observations."""
+    rows = [np.vstack([rho.twist_part, *(rho.basis[rho.rows_of(place)] for place in places)]) for rho in relations]
+    return [
+        VelocityRelation(
+            basis, rho.twist_rows, tuple(rho.sizes[i] for i in places), rho.mobility, min(rho.gap, rank.gap)
+        )
+        for rho, (basis, rank) in zip(relations, compute_range_bases(rows, 1.0), strict=True)
+    ]
+
+
+def decompose_relations(relations: Sequence[VelocityRelation]) -> None:
+    """Compute the unobserved motions of several relations together, which costs less than one by one."""
+    for rho, motion in zip(relations, _find_unobserved_motions(relations), strict=True):
+        rho.__dict__["_unobserved"] = motion
+
+
+def _find_unobserved_motions(relations: Sequence[VelocityRelation]) -> list[_UnobservedMotion]:
+    """Return the unobserved twists of each relation, and what moves while the platform is fixed."""
+    still = compute_matrix_spectra([rho.rates for rho in relations], 1.0)
+    twists = compute_range_bases([rho.twist_part @ at.kernel for rho, at in zip(relations, still, strict=True)], 1.0)
+    fixed = compute_matrix_spectra([rho.twist_part for rho in relations], 1.0)
+    rates = compute_range_bases([rho.rates @ at.kernel for rho, at in zip(relations, fixed, strict=True)], 1.0)
+    return [
+        _UnobservedMotion(basis, Rank(rank.value, min(rank.gap, at.rank.gap)), at.rank, free.value)
+        for at, (basis, rank), (_, free) in zip(still, twists, rates, strict=True)
+    ]
 
 
 def compute_platform_motions(at: ClosedConfiguration, observation_model: ObservationModel) -> Array:
