@@ -114,3 +114,36 @@ def test_the_construct_of_a_file_is_recognised(name: str, tmp_path: Path):
     programs = {each.message.split("): ")[1].split()[0] for each in asked}
     assert programs == ({"mujoco"} if name in ("loop_joint", "two joints, one child") else {"mujoco", "isaac"})
     assert {each.severity for each in asked} == {"error"}
+
+
+@pytest.mark.parametrize("name", ["rrrrr_m1", "quattro"])
+def test_loops_of_an_articulation_must_be_excluded_for_isaac(name: str, tmp_path: Path):
+    """As many joints as Euler's count of loops are named, and the command of the advice leaves none."""
+    pytest.importorskip("pxr")
+    path, written = tmp_path / "robot.usda", tmp_path / "OUT.usda"
+    hrsynth.save(name, path)
+    assert not any(each.rule == "program-drops" for each in hrsynth.lint(path, program="isaac").findings)
+    whole = path.read_text()
+    path.write_text(re.sub(r".*excludeFromArticulation.*\n", "", whole))
+    robot = hrsynth.load(path)
+    loops = len(robot.joints) - len(robot.links) + 1
+    told = [each for each in hrsynth.lint(path, program="isaac").findings if each.rule == "program-drops"]
+    assert len(told) == loops == whole.count("excludeFromArticulation")
+    assert all("excludeFromArticulation" in str(each.advice) and "OUT.usda" in str(each.advice) for each in told)
+    hrsynth.save(robot, written)
+    assert not any(each.rule == "program-drops" for each in hrsynth.lint(written, program="isaac").findings)
+    path.write_text(path.read_text().replace("PhysicsArticulationRootAPI", "OtherAPI"))
+    assert not any(each.rule == "program-drops" for each in hrsynth.lint(path, program="isaac").findings)
+
+
+@pytest.mark.parametrize("program", ["mujoco", "isaac", "gazebo-classic"])
+def test_advice_is_about_the_program_that_was_named(program: str, tmp_path: Path):
+    if program == "isaac":
+        pytest.importorskip("pxr")
+    path = tmp_path / "robot.urdf"
+    path.write_text(URDF["urdf+"])
+    (found,) = [each for each in hrsynth.lint(path, program=program).findings if each.rule == "program-drops"]
+    (ending,) = re.findall(r"hrsynth convert IN OUT(\.\w+)", str(found.advice))
+    hrsynth.save(hrsynth.load(path, platform="bar"), tmp_path / f"out{ending}")
+    after = hrsynth.lint(tmp_path / f"out{ending}", program=program).findings
+    assert not any(each.rule == "program-drops" for each in after)

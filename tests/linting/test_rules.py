@@ -23,7 +23,16 @@ from hrsynth.mechanism.normal import reduce_to_normal_form
 from linting.defects import CASES, Case, damaged, foreign, put, rounded, sound
 from strategies import planar, random_rotation, transformed
 
-ELSEWHERE = {"geometry-rounded", "constraint-redundant", "loop-mirrored", "frames-coincide", "zero-singular", "merged"}
+ELSEWHERE = {
+    "closure-misplaced",
+    "closure-locks",
+    "geometry-rounded",
+    "constraint-redundant",
+    "loop-mirrored",
+    "frames-coincide",
+    "zero-singular",
+    "merged",
+}
 """Rules whose files are made in a test of their own."""
 
 
@@ -250,6 +259,33 @@ def test_a_mirrored_closure_is_found_and_turned(tmp_path: Path):
     found = hrsynth.lint(bad, fix=True)
     assert [each.rule for each in found.fixed] == ["loop-mirrored"]
     assert load(bad).differences(load(good)) == []
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_an_anchor_typed_in_world_numbers_is_told_with_its_distance(seed: int, tmp_path: Path):
+    """Of a four-bar far from the world's origin; by arithmetic. Typed in the frame of its body it raises no alarm."""
+    A, B, C, D = np.array([[0, 0], [0.05, 0.09], [0.27, 0.12], [0.24, 0]]) + np.random.default_rng(seed).uniform(
+        0.4, 0.8, (1, 2)
+    )
+    words = {
+        name: f"{float(x)!r} 0 {float(z)!r}"
+        for name, (x, z) in {"A": A, "B": B - A, "C": C, "D": D, "BC": C - B}.items()
+    }
+    for name, alarms in (("BC", 0), ("C", 1)):
+        path = tmp_path / f"{name}.xml"
+        path.write_text(
+            f'''<mujoco><worldbody><body name="crank" pos="{words["A"]}"><joint name="a" axis="0 1 0"/>
+            <geom size="0.004"/><body name="rod" pos="{words["B"]}"><joint name="b" axis="0 1 0"/><geom size="0.004"/>
+            </body></body><body name="rocker" pos="{words["D"]}"><joint name="d" axis="0 1 0"/><geom size="0.004"/>
+            </body></worldbody><equality>
+            <connect name="pin" body1="rod" body2="rocker" anchor="{words[name]}"/></equality></mujoco>'''
+        )
+        found = [each for each in hrsynth.lint(path, platform="rod").findings if each.rule == "closure-misplaced"]
+        assert len(found) == alarms
+        for each in found:
+            distance = min(np.linalg.norm(C), np.linalg.norm(B + C - D)) - 0.004
+            assert each.line == 5
+            assert f"the point of 'pin' is {distance:.3g} m or more from both of its links" in each.message
 
 
 def test_redundant_constraints_are_named_and_counted(tmp_path: Path):

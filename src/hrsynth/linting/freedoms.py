@@ -12,8 +12,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..budgets import LINT_RANK_SAMPLES_COUNT, LOOP_ASSEMBLY_TRIES_MAX, LOOP_COORDINATES_MAX
-from ..description.assembly.loops import LoopAssembly, Values, gears_of, joints_of
+from ..description.assembly.loops import LOOP_ASSEMBLY_TRIES_MAX, LoopAssembly, Values
+from ..description.conversion import list_coupling_specs, list_joint_specs
 from ..description.jointgraph import FrameSpec, JointSpec
 from ..errors import HrsynthError
 from ..geometry.vectors import Array, build_pose, invert_pose, transform
@@ -21,6 +21,9 @@ from ..mechanism.legs import decompose
 from ..mechanism.model import JointType, Mechanism
 from ..mechanism.normal import reduce_to_normal_form
 from ..tolerances import CLOSURE_SOLVER_TOL, RANK_GAP_MIN
+
+LINT_RANK_SAMPLES_COUNT = 3
+"""Configurations near zero at which a rank must agree before lint reports it."""
 
 Pair = tuple[str, str]
 
@@ -40,14 +43,12 @@ class NearbyFreedoms:
     def configurations(self) -> tuple[Values, ...]:
         """Closed values near zero along random motions; zero alone if nothing moves or closes."""
         zero = self.assembly.zero()
-        if self.assembly.size > LOOP_COORDINATES_MAX:
+        if self.assembly.is_too_large:
             return ()
         found: list[Values] = []
         rng = np.random.default_rng(0)
-        kernel = self.assembly.kernel(zero)
-        for _ in range(LOOP_ASSEMBLY_TRIES_MAX if kernel.shape[1] else 0):
-            step = kernel @ rng.normal(size=kernel.shape[1])
-            there, residual = self.assembly.close(self.assembly.step(zero, 0.15 * step / np.max(np.abs(step))))
+        for _ in range(LOOP_ASSEMBLY_TRIES_MAX if self.assembly.kernel(zero).size else 0):
+            there, residual = self.assembly.close(self.assembly.draw(zero, 0.15, rng))
             if residual <= 10 * CLOSURE_SOLVER_TOL:
                 found.append(there)
             if len(found) == LINT_RANK_SAMPLES_COUNT:
@@ -61,15 +62,14 @@ class NearbyFreedoms:
         return found.pop() if len(found) == 1 else None
 
     def _counts(self, without: Collection[str], held: Collection[Pair]) -> Iterator[int | None]:
-        joints = [joint for joint in joints_of(self.mechanism) if joint.name not in without]
-        gears = [gear for gear in gears_of(self.mechanism) if gear.name not in without]
+        joints = [joint for joint in list_joint_specs(self.mechanism) if joint.name not in without]
+        gears = [gear for gear in list_coupling_specs(self.mechanism) if gear.name not in without]
         for values in self.configurations:
             poses = self.assembly.poses(values)
             locks = [self._lock(f"held {number}", pair, poses) for number, pair in enumerate(held)]
             assembly = LoopAssembly(self.mechanism.base, [*joints, *locks], gears)
             rank = assembly.rank(values)
-            free = sum(joint.kind.freedoms for joint, _, _ in assembly.tree)
-            yield free - rank.value if rank.gap >= RANK_GAP_MIN else None
+            yield assembly.model.nv - rank.value if rank.gap >= RANK_GAP_MIN else None
 
     @cached_property
     def point(self) -> Array | None:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, TypedDict
 
-from ..budgets import LINT_FIX_ROUNDS_MAX
 from ..description import find_robot_file
 from ..description.files import require_writable, write_whole
 from ..description.overrides import Overrides, parse_names
@@ -18,6 +17,9 @@ from .findings import SEVERITIES, Finding, Fix
 from .linted_file import LintedFile
 from .rules import lint_rules
 from .rules.readers import PROGRAMS
+
+LINT_FIX_ROUNDS_MAX = 8
+"""Largest number of passes of lint --fix."""
 
 
 class LintCounts(TypedDict):

@@ -43,11 +43,9 @@ class LintedFile:
         other: LintedFile | None = None,
     ) -> None:
         self.given, self.readers, self.other = given or Overrides(), readers, other
-        opened = open_robot_file(Path(path), strict=False)
-        if opened.root is None and isinstance(
-            graph := formats.read(opened), JointGraph
-        ):  # a YAML file next to a document
-            opened = open_robot_file(Path(graph.file), strict=False)
+        opened = open_robot_file(Path(path), Overrides(args=self.given.args, model=self.given.model), strict=False)
+        if opened.root is None:  # a YAML file next to a document
+            opened = open_robot_file(Path(formats.read(opened).file), strict=False)
         self.path, self.file = opened.path, str(opened.path)
         self.data = xml.read_bytes(opened.path) if text is None else text
         self.root = opened.root if text is None else xml.parse_document(text, self.file)
@@ -67,9 +65,7 @@ class LintedFile:
 
     def graph(self) -> JointGraph:
         """Return the joint graph of the file before assembly. Raises ``BadRobotFile``."""
-        found = formats.read(self.open())
-        assert isinstance(found, JointGraph)
-        return found
+        return formats.read(self.open())
 
     @cached_property
     def said(self) -> JointGraph | None:

@@ -10,10 +10,16 @@ from itertools import product
 
 import numpy as np
 
-from ..budgets import AXIS_SENSE_CHOICES_MAX, CENTRE_ALIGNMENT_STEPS_MAX
 from ..geometry.vectors import Array, build_pose
 from ..mechanism.model import Joint, JointType, Mechanism
-from ..tolerances import EXACT_INCIDENCE_TOL, INCIDENCE_TOL, ROBOT_DIFFERENCE_TOL, ROTATION_LEVER_MIN_FRACTION
+from ..tolerances import EXACT_INCIDENCE_TOL, INCIDENCE_TOL, ROTATION_LEVER_MIN_FRACTION
+
+ROBOT_DIFFERENCE_TOL = 1e-5
+"""Relative difference (characteristic lengths, radians, masses) up to which two files describe one robot."""
+CENTRE_ALIGNMENT_STEPS_MAX = 300
+"""Largest number of steps that align revolute joint centres of two files along their axes."""
+AXIS_SENSE_CHOICES_MAX = 6
+"""Axes of a link up to which all signs in the other file are tried."""
 
 _ALONG = (JointType.REVOLUTE, JointType.CYLINDRICAL)
 _LINES = (*_ALONG, JointType.PRISMATIC)

@@ -10,11 +10,10 @@ from ...description import xml
 from ...errors import HrsynthError
 from ...mechanism.model import Joint, Mechanism
 from ...mechanism.normal import reduce_to_normal_form
-from ...tolerances import ROBOT_DIFFERENCE_TOL
 from ..elements import list_inertials
 from ..findings import LintRule, RuleHit
 from ..linted_file import LintedFile
-from ..matching import LinkFit, RobotMatch
+from ..matching import ROBOT_DIFFERENCE_TOL, LinkFit, RobotMatch
 
 
 def _match(file: LintedFile) -> RobotMatch | None:
@@ -225,10 +224,9 @@ def _compare_couplings(file: LintedFile) -> Iterator[RuleHit]:
     if match is None:
         return
     mine = {
-        (match.links.get(each.predecessor, ""), match.links.get(each.successor, "")): each
-        for each in match.one.couplings
+        (match.joints.get(each.driver, ""), match.joints.get(each.driven, "")): each for each in match.one.couplings
     }
-    theirs = {(each.predecessor, each.successor): each for each in match.other.couplings}
+    theirs = {(each.driver, each.driven): each for each in match.other.couplings}
     for ends in dict.fromkeys([*mine, *theirs]):
         a, b = mine.get(ends), theirs.get(ends)
         if a is None or b is None or abs(a.ratio - b.ratio) > ROBOT_DIFFERENCE_TOL * abs(a.ratio):

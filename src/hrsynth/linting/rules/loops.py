@@ -7,23 +7,26 @@ from functools import partial
 
 import numpy as np
 
-from ...budgets import LOOP_COORDINATES_MAX
 from ...description import numerals, xml
 from ...description.assembly import assumptions
-from ...description.assembly.build import rounding
 from ...description.assembly.candidates import closure_candidates
-from ...description.assembly.loops import LoopAssembly, LoopSolution, Values, solve
+from ...description.assembly.loops import LoopAssembly, LoopSolution, solve
 from ...description.assembly.zero_configuration import count_from, moves
+from ...description.contents import collect_content
+from ...description.conversion import move_along_joint
 from ...description.jointgraph import JointGraph, JointSpec
-from ...description.jointmotion import compute_closure_error, compute_joint_pose
 from ...errors import HrsynthError
+from ...geometry.vectors import Array, transform
 from ...mechanism.model import Joint, JointType, Mechanism
-from ...tolerances import EXACT_INCIDENCE_TOL, INCIDENCE_TOL, OPPOSITE_AXES_TOL, TOLERANCE_AMBIGUITY_FRACTION
+from ...tolerances import EXACT_INCIDENCE_TOL, INCIDENCE_TOL, TOLERANCE_AMBIGUITY_FRACTION
 from ..elements import NumberAt
 from ..findings import Fix, LintRule, RuleHit
 from ..freedoms import NearbyFreedoms
 from ..linted_file import LintedFile
 from .names import OWN, remove_element
+
+OPPOSITE_AXES_TOL = 1e-3
+"""One plus the cosine between two axes of a closure below which they are opposite."""
 
 CLOSING = ("loop", "constraint", "loop_joint", "joint", "connect", "weld", "coupling")
 """Elements that close loops, in any format."""
@@ -42,10 +45,10 @@ def _read_loops(file: LintedFile) -> tuple[JointGraph, LoopAssembly] | None:
         file.given.apply(graph)
     except HrsynthError:
         return None
-    base = graph.base or assumptions.base(graph)
+    base = assumptions.base(graph)
     graph.prune(base)
     assembly = LoopAssembly(base, list(graph.joints.values()), graph.gears)
-    return None if max(assembly.size, len(assembly.loops)) > LOOP_COORDINATES_MAX else (graph, assembly)
+    return None if assembly.is_too_large else (graph, assembly)
 
 
 def _open(file: LintedFile) -> Iterator[RuleHit]:
@@ -53,12 +56,8 @@ def _open(file: LintedFile) -> Iterator[RuleHit]:
     if found is None:
         return
     graph, assembly = found
-    zero = assembly.poses(assembly.zero())
-    misses = {}
-    for loop in assembly.loops:
-        given = graph.joints[loop.name]
-        if not _has_opposite_axes(given, zero):
-            misses[loop.name] = _measure_miss(given, zero, assembly.length)
+    zero, every = assembly.poses(assembly.zero()), assembly.misses(assembly.zero())
+    misses = {loop.name: every[loop.name] for loop in assembly.loops if not _has_opposite_axes(loop, zero)}
     worst = max(misses, key=lambda name: misses[name], default=None)
     if worst is None or misses[worst] <= INCIDENCE_TOL or _is_explained_by_rounding(file, graph, assembly):
         return
@@ -85,14 +84,8 @@ def _open(file: LintedFile) -> Iterator[RuleHit]:
 def _is_explained_by_rounding(file: LintedFile, graph: JointGraph, assembly: LoopAssembly) -> bool:
     """Return True if rounded numbers explain the closure residual: geometry repair suffices, no joint has to move."""
     miss = assembly.worst(assembly.zero())[1]
-    explained = file.given.tolerance or rounding(graph.digits, assembly.length / graph.unit, miss)
+    explained = file.given.tolerance or graph.digits.rounding(assembly.length / graph.unit, miss)
     return not file.given.as_written and miss <= TOLERANCE_AMBIGUITY_FRACTION * explained
-
-
-def _measure_miss(joint: JointSpec, poses: dict[str, np.ndarray], length: float) -> float:
-    error, _ = compute_closure_error(joint, *joint.frames(poses))
-    gap = 3 - (2 if joint.kind is JointType.PLANAR else 1 if joint.kind.has_translation else 0)
-    return float(np.linalg.norm([*(error[:gap] / length), *error[gap:]]))
 
 
 def _repair_zero(file: LintedFile, graph: JointGraph, assembly: LoopAssembly, closed: LoopSolution) -> Fix | None:
@@ -100,27 +93,22 @@ def _repair_zero(file: LintedFile, graph: JointGraph, assembly: LoopAssembly, cl
     limits and the offset of its mimic lose it."""
     if file.dialect != "urdf" or file.expanded or closed.beyond:
         return None
-    moved = []
+    moved, q = [], assembly.coordinates(closed.values)
     for joint, _, _ in assembly.tree:
-        if np.array_equal(compute_joint_pose(joint, closed.values[joint.name]), np.eye(4)):
+        if not q[joint.name].any():
             continue
         element = file.element(graph.joints[joint.name].line, "joint", name=joint.name)
         part = OWN.search(joint.name)  # of a chain that is one joint only if its frames stay aligned
         if element is None or part or joint.kind not in (JointType.REVOLUTE, JointType.PRISMATIC):
             return None
         moved.append((joint, element))
-    return partial(_set_zero, moved, closed.values, graph, assembly)
+    return partial(_set_zero, moved, assembly.singles(closed.values), assembly.closing(closed.values))
 
 
-def _set_zero(
-    moved: list[tuple[JointSpec, xml.Element]], values: Values, graph: JointGraph, assembly: LoopAssembly
-) -> None:
-    turned: dict[str | None, float] = {}
-    for scaled, element in moved:
-        joint = graph.joints[scaled.name]
-        q = float(values[joint.name][0]) * assembly.unit(scaled)
-        turned[joint.name] = q
-        X = joint.ends[0].X @ compute_joint_pose(joint, np.array([q]))
+def _set_zero(moved: list[tuple[JointSpec, xml.Element]], turned: dict[str, float], shifts: dict[str, float]) -> None:
+    for joint, element in moved:
+        q = turned[joint.name]
+        X = joint.ends[0].X @ move_along_joint(joint, q)
         origin = element.find("origin")
         if origin is None:
             origin = element.makeelement("origin", {})
@@ -128,15 +116,14 @@ def _set_zero(
         origin.set("xyz", numerals.format_exact_vector(X[:3, 3]))
         origin.set("rpy", numerals.format_exact_vector(numerals.compute_rounded_rpy(X[:3, :3])))
         _shift_limits(element, q)
-    shifts = assembly.closing(values)
     for element in moved[0][1].getroottree().iter("loop"):
         if q := shifts.get(str(element.get("name")), 0.0):
             _shift_limits(element, q)
     for element in moved[0][1].getroottree().iter("joint"):
         for mimic in element.iterfind("mimic"):
             ratio = NumberAt(mimic, "multiplier").value
-            led = (1.0 if ratio is None else ratio) * turned.get(mimic.get("joint"), 0.0)
-            if own := turned.get(element.get("name"), 0.0) - led:
+            led = (1.0 if ratio is None else ratio) * turned.get(str(mimic.get("joint")), 0.0)
+            if own := turned.get(str(element.get("name")), 0.0) - led:
                 offset = (NumberAt(mimic, "offset").value or 0.0) - own
                 mimic.set("offset", numerals.format_exact(offset if abs(offset) > EXACT_INCIDENCE_TOL else 0.0))
 
@@ -169,10 +156,9 @@ def _find_mirrored(file: LintedFile) -> Iterator[RuleHit]:
     found = read_loops(file)
     if found is None:
         return
-    graph, assembly = found
+    _, assembly = found
     poses = assembly.poses(assembly.zero())
-    for loop in assembly.loops:
-        joint = graph.joints[loop.name]
+    for joint in assembly.loops:
         if _has_opposite_axes(joint, poses):
             yield RuleHit(joint.line, f"the two axes of {joint.name!r} are opposite at zero", _turn_axis(file, joint))
 
@@ -189,6 +175,33 @@ def _turn_axis(file: LintedFile, joint: JointSpec) -> Fix | None:
 def _reverse(axis: xml.Element) -> None:
     """Reverse the current axis, which another fix may have changed."""
     axis.set("xyz", numerals.format_exact_vector(-numerals.parse(axis.get("xyz", "1 0 0"), 3)))
+
+
+def _find_misplaced(file: LintedFile) -> Iterator[RuleHit]:
+    robot = file.mechanism
+    if robot is None:
+        return
+    for joint in robot.joints.values():
+        distance = min(_measure_distance(robot, link, joint, joint.point) for link in joint.links)
+        if joint.in_tree or distance <= robot.length:
+            continue
+        for link in joint.links:
+            numbers = transform(robot.links[link].inverse, joint.point)
+            nearer = max(_measure_distance(robot, end, joint, numbers) for end in joint.links)
+            if nearer < distance / 2:
+                text = f"the point of {joint.name!r} is {distance:.3g} m or more from both of its links"
+                cure = f"; its numbers in the frame of {link!r}, read in the world's, are within {nearer:.3g} m"
+                yield RuleHit(_find_line(file, joint.name), text + cure)
+                break
+
+
+def _measure_distance(robot: Mechanism, link: str, closure: Joint, point: Array) -> float:
+    """Return the distance (m) of a point from the joints and shapes of a link, a closure aside; 0 if it has none."""
+    places = [(joint.point, 0.0) for joint in robot.joints_of(link) if joint is not closure]
+    for solid in collect_content(robot.links[link], robot).solids:
+        centre = transform(robot.links[link].pose, solid.X[:3, 3])
+        places.append((centre, float(np.linalg.norm(solid.sizes)) / (1 if solid.kind == "sphere" else 2)))
+    return min((max(float(np.linalg.norm(point - at)) - radius, 0.0) for at, radius in places), default=0.0)
 
 
 def sample_nearby(file: LintedFile) -> NearbyFreedoms | None:
@@ -273,8 +286,12 @@ def _find_coincident(file: LintedFile) -> Iterator[RuleHit]:
     graph = file.said
     if graph is None:
         return
-    held = graph.closing | {link for joint in graph.joints.values() if not joint.in_tree for link in joint.links}
-    for each in closure_candidates(graph, graph.base or assumptions.base(file.graph())):
+    held = (
+        graph.closing
+        | file.given.ends
+        | {link for joint in graph.joints.values() if not joint.in_tree for link in joint.links}
+    )
+    for each in closure_candidates(graph, assumptions.base(file.graph())):
         one, two = each.links
         if each.coincides and not held & {one, two} and not _is_near_in_tree(graph, one, two):
             yield RuleHit(
@@ -305,6 +322,15 @@ RULES = (
         "reverse one of the two axes",
         _find_mirrored,
         fixable=True,
+    ),
+    LintRule(
+        "closure-misplaced",
+        "warning",
+        "a closure whose point is far from both links",
+        "Coordinates of the world were probably typed where those of a link's frame are expected. "
+        "The closure then has another lever arm, and the robot other motions.",
+        "write the point in the frame of the link",
+        _find_misplaced,
     ),
     LintRule(
         "constraint-dead",

@@ -11,11 +11,13 @@ from ...description import xml
 from ...geometry.vectors import Array
 from ...mechanism import graphs
 from ...mechanism.model import JointType
-from ...tolerances import NEGATIVE_MOMENT_TOL
 from ..elements import InertialElement, list_inertials
 from ..findings import LintRule, RuleHit
 from ..linted_file import LintedFile
 from .names import OWN
+
+NEGATIVE_MOMENT_TOL = 1e-6
+"""Relative negative second moment that an inertia may have: printed digits of a flat link."""
 
 
 def list_moving_links(file: LintedFile) -> set[str]:

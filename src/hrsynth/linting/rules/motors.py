@@ -56,7 +56,7 @@ RULES = (
         "no motor",
         "The Type 2 singularities of the real robot depend on which joints have motors; URDF+ and plain URDF "
         "often do not name them.",
-        "name them: a <transmission> for each, or --motors JOINTS",
+        "name them: a <transmission> for each, a <command_interface> in <ros2_control>, or --motors JOINTS",
         _find_none,
     ),
     LintRule(

@@ -1,7 +1,8 @@
 """Closures that other programs do not read: a table of the constructs that each program knows.
 
 Pinocchio 4.1, MuJoCo 4.0 and yourdfpy 0.0.60 were tried (a test repeats it); the entries of Gazebo are from its
-tutorial on closed loops and gz-physics issue 25, those of Isaac Sim from its importer's UrdfLoopJoint. For programs
+tutorial on closed loops and gz-physics issue 25, those of Isaac Sim from its importer's UrdfLoopJoint and from PhysX,
+whose articulations are trees. For programs
 that are in no row of a construct nothing is known, and nothing is reported.
 """
 
@@ -11,7 +12,8 @@ from collections.abc import Iterator
 
 from lxml import etree
 
-from ...description.jointgraph import join_names
+from ...description.formats.usd import EXCLUDED
+from ...description.jointgraph import build_spanning_tree, join_names
 from ..findings import LintRule, RuleHit
 from ..linted_file import LintedFile
 
@@ -37,8 +39,15 @@ CONSTRUCTS = {
     "equality/weld": {"mujoco": READ, "pinocchio": ASKED},
     "equality/joint": {"mujoco": READ, "pinocchio": SILENT},
     "second joint of one child in SDFormat": {"gazebo-classic": READ, "gazebo": TOLD},
+    "loop in the articulation of USD": {"isaac": REFUSED},
 }
 """Behaviour of each program for each construct."""
+WRITTEN = {
+    "mujoco": "write it in MJCF: hrsynth convert IN OUT.xml",
+    "gazebo-classic": "write it in SDFormat: hrsynth convert IN OUT.sdf",
+    "isaac": f"exclude joint {{!r}} from the articulation ({EXCLUDED} = true), as hrsynth convert IN OUT.usda does",
+}
+"""Advice for programs that read the loops of a format."""
 TAGS = ("loop", "coupling", "constraint", "loop_joint", "joint", "mimic", "connect", "weld", "plugin")
 
 
@@ -47,6 +56,8 @@ def _name_construct(file: LintedFile, name: str, line: int | None) -> str | None
     graph = file.said
     if graph is not None and graph.dialect == "Gepetto" and line is None:
         return "closed_loop of the YAML file"
+    if graph is not None and graph.dialect == "USD":
+        return "loop in the articulation of USD" if name in graph.joints and graph.joints[name].in_tree else None
     element = file.element(
         line, *TAGS, *(f"{{*}}{tag}" for tag in ("ball_constraint", "linear_bushing_rpy")), name=name
     )
@@ -67,8 +78,12 @@ def list_file_closures(file: LintedFile) -> Iterator[tuple[str, int | None]]:
     if graph is None:
         return
     carried: set[str] = set()
+    base = graph.base or next(iter(graph.links), "")
+    tree = build_spanning_tree(base, graph.joints.values()) if graph.is_articulated else []
+    reached, spanning = {base, *(link for _, _, link in tree)}, {joint.name for joint, _, _ in tree}
     for joint in graph.joints.values():
-        if not joint.in_tree or (file.dialect == "sdf" and joint.links[1] in carried):
+        is_second = file.dialect == "sdf" and joint.links[1] in carried
+        if not joint.in_tree or is_second or (tree and joint.links[0] in reached and joint.name not in spanning):
             yield joint.name, joint.line
         carried.add(joint.links[1])
     for gear in graph.gears:
@@ -81,7 +96,8 @@ def _find_dropped(file: LintedFile) -> Iterator[RuleHit]:
         construct = _name_construct(file, name, line) or ""
         known = CONSTRUCTS.get(construct, {})
         for program in [each for each in file.readers if known.get(each, READ) != READ]:
-            yield RuleHit(line, f"{name!r} ({construct}): {program} {known[program]}", severity="error")
+            advice = WRITTEN[program].format(name) if program in WRITTEN else None
+            yield RuleHit(line, f"{name!r} ({construct}): {program} {known[program]}", None, advice, "error")
         if not file.readers and any(deed != READ for deed in known.values()):
             told.setdefault(construct, []).append((name, line))
     for construct, every in told.items():
@@ -108,7 +124,7 @@ RULES = (
         "The file loads there as an open tree: it falls apart in simulation, and its Jacobians belong to "
         "another robot. With --program NAME only that program is considered.",
         "write the file in a format that the program reads: hrsynth convert IN OUT.xml for MuJoCo, OUT.sdf for "
-        "Gazebo Classic, OUT.yaml for Gepetto's tools",
+        "Gazebo Classic, OUT.yaml for Gepetto's tools, OUT.usda for Isaac Sim",
         _find_dropped,
     ),
 )

@@ -41,7 +41,9 @@ def find_notes(*kinds: str, text: str = "") -> Callable[[LintedFile], Iterator[R
     return find
 
 
-_unread = find_notes("open", text=r"(?!\d+ coordinates have motors|the robot's char|no element of the file closes)")
+_unread = find_notes(
+    "open", text=r"(?!\d+ coordinates have motors|the robot's char|no element of the file closes|the closure .* locks)"
+)
 _left_out = find_notes(
     "ignored", text=r"(?!\d+ links that no joint|unknown (element|attribute))"
 )  # these have rules of their own
@@ -87,6 +89,14 @@ RULES = (
         "Simulator plugins and elements that connect links, but with incomplete data.",
         "close the loop with the option in the message",
         _unread,
+    ),
+    LintRule(
+        "closure-locks",
+        "warning",
+        "a closure that locks its loop",
+        "No joint of the loop can move. Tools write rigid (6D) closures for revolute and spherical joints.",
+        "close the loop with the option in the message, or with the joint that the robot has: --close A:B:TYPE",
+        find_notes("open", text="the closure .* locks"),
     ),
     LintRule(
         "merged",

@@ -7,13 +7,24 @@ from functools import partial
 
 import numpy as np
 
-from ...budgets import CHARACTERISTIC_LENGTH_MAX_M, CHARACTERISTIC_LENGTH_MIN_M, INERTIA_BODY_WIDTH_MAX
 from ...description import numerals, xml
+from ...description.numerals import ROUNDED_UNIT_VECTOR_TOL
 from ...geometry.vectors import Array
-from ...tolerances import AXIS_LENGTH_TOL, DEGREE_MULTIPLE_MIN, FULL_TURN_RAD, ROUNDED_UNIT_VECTOR_TOL
+from ...tolerances import CHARACTERISTIC_LENGTH_MAX_M
 from ..elements import NumberAt, list_inertials, list_joint_elements, list_limits
 from ..findings import Fix, LintRule, RuleHit
 from ..linted_file import LintedFile
+
+DEGREE_MULTIPLE_MIN = 5.0
+"""Angles in a file that are whole multiples of it (degrees) and larger than a turn in radians are taken for degrees."""
+AXIS_LENGTH_TOL = 1e-3
+"""Deviation of an axis length from one in a file that is reported."""
+FULL_TURN_RAD = 6.3
+"""Radians above which an angle in a file is more than a turn."""
+CHARACTERISTIC_LENGTH_MIN_M = 1e-3
+"""Characteristic length (m) below which lint doubts that a file is in metres."""
+INERTIA_BODY_WIDTH_MAX = 20.0
+"""Characteristic lengths that the body of an inertia may be wide."""
 
 
 def is_in_degrees(value: float | None) -> bool:
