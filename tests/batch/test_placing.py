@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from batch.test_batch import SOLVED, poses_near, shipped_batch
+from batch.test_batch import SOLVED, check_law, poses_near, shipped_batch
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.singularity.batch_spectrum import Quick
 from hrsynth.analysis.singularity.condition_check import compute_spectrum
@@ -16,6 +16,7 @@ from hrsynth.errors import Disagreement
 from hrsynth.mechanism.pose import Grid
 from hrsynth.tolerances import CLOSURE_RESIDUAL_TOL
 from kinematics.robots import ROBOTS
+from strategies import planar
 
 WITHOUT = SOLVED | {"i4l", "prrrp_parallel_point"}
 """Robots whose legs are solved by iteration, or that have a link that goes with no pose of the platform."""
@@ -46,6 +47,20 @@ def test_every_pose_that_is_reached_becomes_a_closed_configuration(robot: str) -
         assert np.max(np.abs(at.pose(batch.coordinates.link) - X[i])) < 1e-9
         u = [at.pose(o.link)[:3, :3] @ o.direction for o in setup.placer.seen.values()]
         assert np.max(np.abs(np.array(u) - found.directions[i])) < 1e-9
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_rod_that_slides_beside_an_axis_is_a_closed_form(seed: int) -> None:
+    """Of a planar RPR leg whose slide misses the foot: its directions are Pinocchio's, its poses become closed."""
+    setup = ObservedRobot.of(planar(["RPR", "RRR", "RPR"], np.random.default_rng(seed), [{0}] * 3), samples=3)
+    batch = setup.batch
+    assert batch is not None
+    assert [leg is not None and leg.slides and not leg.can_reverse for leg in batch.legs.values()] == [1, 0, 1]
+    assert check_law(setup, batch.known, 6) >= 3
+    X = np.concatenate([batch.home[None], poses_near(batch, 20, 0.1)])
+    met = [at for at in setup.placer.configurations(X) if at is not None]
+    assert len(met) == batch.evaluate(X).reached.sum() > 10
+    assert all(at.residual <= CLOSURE_RESIDUAL_TOL for at in met)
 
 
 @pytest.mark.parametrize("robot", ["quattro", "6pus", "3upu", "3rrp", "gough_stewart"])

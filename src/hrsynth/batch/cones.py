@@ -19,8 +19,12 @@ from __future__ import annotations
 from typing import Any
 
 from ..geometry.components import Components, build_tangents, dot, normalise, plus, scale, sqrt, times, where
-from ..tolerances import CONE_PAIR_GAP_TOL, FLAT_CONE_FRACTION
 from .program import Program
+
+CONE_PAIR_GAP_TOL = 1e-14
+"""Relative gap between the bounds at which a maximum over two cones is found."""
+FLAT_CONE_FRACTION = 1e-20
+"""Fraction of a cone's largest squared error below which its term has no derivative."""
 
 CONE_PAIR_NEWTON_STEPS_MAX = 12
 """Steps after which the direct way to the maximum of two cones is given up."""

@@ -12,10 +12,14 @@ from itertools import takewhile
 
 import numpy as np
 
-from ..budgets import DIRECTION_RATE_GROWTH_MAX
-from ..closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, PlatformDirection
+from ..closed_forms.legs import ClosedFormLeg
 from ..errors import SamplingFailure
-from ..geometry.so3 import convert_to_quaternions, convert_vectors_to_rotations, find_smallest_rotations
+from ..geometry.so3 import (
+    convert_to_quaternions,
+    convert_vectors_to_rotations,
+    decompose_rotation,
+    find_smallest_rotations,
+)
 from ..geometry.vectors import Array, freeze_array, hat, invert_pose
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.pinocchio_model import PinocchioModel, choose_slide_direction
@@ -26,13 +30,16 @@ from ..mechanism.screws import split_elementary
 from ..results import Value
 from ..tolerances import CLOSURE_RESIDUAL_TOL
 from .engine import Batch, Flags
-from .iterative_leg import IterativeLeg
+from .iterative_leg import LEG_FINAL_STEPS_COUNT, IterativeLeg
 from .program import POSE_CHUNK_COUNT
+
+DIRECTION_RATE_GROWTH_MAX = 20.0
+"""Largest ratio of direction rates to those at zero on a walk of poses in a batch."""
 
 WALK_STEP_LENGTH_FRACTION = 0.15
 """Length of a step of a walk (characteristic lengths, radians)."""
 LEG_GAUSS_NEWTON_STEPS_COUNT = 12
-"""Gauss-Newton steps from where the subproblem puts a leg's links."""
+"""Gauss-Newton steps from where the subproblem puts a leg's links; what they do not close is led from zero."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -52,8 +59,8 @@ class ConfigurationBuilder(Value):
         """None where a leg is no known subproblem, or a link belongs neither to a leg nor to the platform."""
         mechanism = decomposition.mechanism
         placed = {mechanism.base, *batch.coordinates.links, *(name for leg in decomposition.legs for name in leg.links)}
-        known = all(isinstance(leg, ClosedFormLeg) for leg in batch.legs.values())
-        if not (known and batch.coordinates.has_constant_twists and placed == set(mechanism.links)) or any(
+        known = batch.coordinates.has_constant_twists and None not in batch.legs.values()
+        if not (known and placed == set(mechanism.links)) or any(
             joint.type is JointType.FREE for joint in mechanism.joints.values()
         ):
             return None
@@ -129,32 +136,31 @@ class ConfigurationBuilder(Value):
         reached = np.ones(len(X), dtype=bool)
         for leg in self.decomposition.legs:
             chain, form = self.legs[leg.label], batch.legs[leg.label]
-            assert isinstance(form, ClosedFormLeg)
-            guess, there = self._guess(leg, form, frames, p, R)
-            state = np.stack([guess[name] for name in chain.links], axis=1)
-            state[:, :, :3, 3] /= batch.length
-            state[~there] = chain.zero
-            end = state[:, 1].copy()
-            state, residual = chain.close(state, end, LEG_GAUSS_NEWTON_STEPS_COUNT)
+            assert form is not None
+            guess, u, there = self._guess(leg, form, frames, p, R)
+            ends = chain.end(batch.coordinates, p, R)
+            q = np.where(there[:, None], chain.system.read(guess.__getitem__), chain.system.zero)
+            q, residual = chain.close(q, ends, LEG_GAUSS_NEWTON_STEPS_COUNT)
+            left = there & ~(residual <= CLOSURE_RESIDUAL_TOL)
+            q[left], residual[left] = chain.close(
+                chain.start(int(left.sum())), ends[left], LEG_FINAL_STEPS_COUNT, u[left]
+            )
             reached &= there & (residual <= CLOSURE_RESIDUAL_TOL)
-            state[:, :, :3, 3] *= batch.length
-            frames.update({name: state[:, i] for i, name in enumerate(chain.links) if name in leg.links})
+            frames.update(chain.frames(leg.links, q))
         return frames, reached
 
     def _guess(
         self, leg: Leg, form: ClosedFormLeg, frames: Mapping[str, Array], p: Array, R: Array
-    ) -> tuple[dict[str, Array], Flags]:
+    ) -> tuple[dict[str, Array], Array, Flags]:
         """Return the start poses of the leg's links: its first link on its circle or line, the others rotated as the
-        observed one."""
+        observed one; its direction (n, 3), and where it reaches, (n,)."""
         mechanism, seen = self.decomposition.mechanism, self.seen[leg.label]
         n = len(p)
         zero = mechanism.links[seen.link].pose[:3, :3] @ seen.direction
         with np.errstate(invalid="ignore", divide="ignore"):
-            u, there = form.direction(p, R)
-            ends = form.ends(p, R)
-        if not isinstance(form, PlatformDirection):
+            u, there, B = form.pose(p, R)
             u = np.where(there[:, None], u, zero)
-        first = _place_first_link(form, ends, there)
+            first = np.where(there[:, None, None], form.displace(B, n), np.eye(4))
         turn = convert_vectors_to_rotations(find_smallest_rotations(zero, u))
         guess = {name: frames[name] for name in (mechanism.base, leg.platform_link)}
         for name in _order_links(mechanism, leg, form.crank):
@@ -168,21 +174,7 @@ class ConfigurationBuilder(Value):
             guess[name] = np.tile(np.eye(4), (n, 1, 1))
             guess[name][:, :3, :3] = turn @ pose[:3, :3]
             guess[name][:, :3, 3] = centre + turn @ (pose[:3, 3] - joint.point)
-        return guess, there
-
-
-def _place_first_link(form: ClosedFormLeg, B: Array | None, there: Flags) -> Array:
-    """The displacement (n, 4, 4) that brings the point of the leg's first link to B."""
-    X = np.tile(np.eye(4), (len(there), 1, 1))
-    if isinstance(form, OnRail) and B is not None:
-        X[:, :3, 3] = B - form.place
-    elif isinstance(form, OnCrank | PlatformDirection) and B is not None:
-        a, start, arm = form.pivot, form.place - form.centre, B - form.centre
-        angle = np.arctan2(arm @ np.cross(a, start), arm @ start)
-        X[:, :3, :3] = convert_vectors_to_rotations(angle[:, None] * a)
-        X[:, :3, 3] = form.centre - X[:, :3, :3] @ form.centre
-    X[~there] = np.eye(4)
-    return X
+        return guess, u, there
 
 
 def _order_links(mechanism: Mechanism, leg: Leg, crank: str) -> list[str]:
@@ -288,17 +280,11 @@ def _read_coordinates(joint: Joint, R: Array, shift: Array) -> list[Array]:
             carried = R @ second
             one = np.arctan2(carried @ normal, carried @ np.cross(normal, first))[:, None]
             rest = convert_vectors_to_rotations(-one * first) @ R
-            return [one, _measure_angle(rest, second)]
+            return [one, decompose_rotation(second[None], rest)]
         case JointType.SPHERICAL:
             return [convert_to_quaternions(R)[:, [1, 2, 3, 0]]]
         case _:
             return [
-                shift @ axis[:, None] if kind is JointType.PRISMATIC else _measure_angle(R, axis)
+                shift @ axis[:, None] if kind is JointType.PRISMATIC else decompose_rotation(axis[None], R)
                 for kind, axis in split_elementary(joint.type, joint.axes, choose_slide_direction)
             ]
-
-
-def _measure_angle(R: Array, axis: Array) -> Array:
-    """The angle (n, 1) of rotations about an axis."""
-    sine = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], 1) @ axis
-    return np.arctan2(sine, 0.5 * (np.trace(R, axis1=1, axis2=2) - 1))[:, None]

@@ -14,7 +14,6 @@ from importlib.util import find_spec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..budgets import LARGEST_BATCH, NUMBA_COMPILE_POSES_MIN, NUMBA_POSES_MIN
 from ..closed_forms.legs import ClosedFormLeg
 from ..errors import BadRequest, MissingExtra
 from ..geometry.components import Components, build_tangents, cross, plus, scale, transform_vector, where
@@ -26,16 +25,21 @@ from ..mechanism.observation import Observation
 from ..mechanism.observations.direction import Direction
 from ..results import Value
 from ..tolerances import RANK_CUTOFF_FRACTION
-from .direction_rows import compute_direction_rows
 from .error_bounds import ErrorBound, bound_errors, is_bound_compiled
 from .iterative_leg import IterativeLeg, IterativeLegStates
 from .leg_wrenches import LegForce, compute_free_twists, list_leg_forces
 from .platform_coordinates import PlatformCoordinates, SlidingLink, collect_frames, find_sliding_links
-from .program import POSE_CHUNK_COUNT, Compiled, Program
+from .program import POSE_CHUNK_COUNT, Program
 from .recognition import recognise_leg
 
+LARGEST_BATCH = 1 << 29
+"""Largest result of one evaluation (bytes); larger ones are evaluated in parts (``Batch.sweep``)."""
+NUMBA_POSES_MIN = 20_000
+"""Poses of a batch from which compiled kernels are worth numba's start (half a second) in a run with many batches."""
+NUMBA_COMPILE_POSES_MIN = 5_000_000
+"""Poses from which compiling a robot's kernels with numba is faster."""
+
 Flags = NDArray[np.bool_]
-EXTRAS = {"numba": "fast", "jax": "jax"}
 ROWS = ("reached", "u", "M")
 """Outputs of the program of closed forms at each pose."""
 
@@ -81,14 +85,14 @@ class Evaluation(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Batch(Value):
-    """Compiled mechanism: each leg a closed form or solved by iteration, None if it hangs on a link whose motion is no
-    function of the platform's pose; ``iterative`` are those that are solved, from which the platform dof follow if no
-    closed form gives them."""
+    """Compiled mechanism: closed forms of its ``legs``, None for one that is solved by iteration or hangs on a link
+    whose motion is no function of the platform's pose; ``iterative`` are those that are solved, from which the platform
+    dof follow if no closed form gives them."""
 
     coordinates: PlatformCoordinates
     home: Array
     """The platform's pose at the zero configuration, (4, 4)."""
-    legs: Mapping[str, ClosedFormLeg | IterativeLeg | None]
+    legs: Mapping[str, ClosedFormLeg | None]
     iterative: Mapping[str, IterativeLeg]
     holds: Sequence[LegForce]
     """Wrenches of the legs in closed form, if the platform has other twists at each pose."""
@@ -125,17 +129,16 @@ class Batch(Value):
         frames = collect_frames(configurations)
         names = tuple(dict.fromkeys((*decomposition.platform, mechanism.platform)))
         coordinates = PlatformCoordinates.of(motion, frames, names, mechanism.length)
-        legs: dict[str, ClosedFormLeg | IterativeLeg | None] = {}
+        legs: dict[str, ClosedFormLeg | None] = {}
         iterative: dict[str, IterativeLeg] = {}
         for leg in decomposition.legs:
-            found = recognise_leg(decomposition, leg, seen[leg.label], coordinates, frames)
+            legs[leg.label] = recognise_leg(decomposition, leg, seen[leg.label], coordinates, frames)
             placed = decomposition.point is not None or leg.platform_link in coordinates.links
-            if placed and (found is None or not coordinates.has_constant_twists):
+            if placed and (legs[leg.label] is None or not coordinates.has_constant_twists):
                 iterative[leg.label] = IterativeLeg.of(mechanism, leg, seen[leg.label], decomposition.point)
-            legs[leg.label] = found or iterative.get(leg.label)
         holds = _list_leg_forces(decomposition, coordinates, iterative, frames)
         if holds:
-            iterative = {label: leg for label, leg in iterative.items() if legs[label] is leg}
+            iterative = {label: leg for label, leg in iterative.items() if legs[label] is None}
         normals = {o.leg: _find_rotation_axis(frames[o.link][:, :3, :3] @ o.direction) for o in seen.values()}
         sliding: dict[str, tuple[SlidingLink, ClosedFormLeg]] = {}
         if coordinates.has_constant_twists and not iterative:
@@ -158,7 +161,12 @@ class Batch(Value):
     @property
     def is_complete(self) -> bool:
         """Return True if every leg is compiled: then ``reached`` holds for the whole robot."""
-        return all(leg is not None for leg in self.legs.values())
+        return len(self.known) == len(self.legs)
+
+    @property
+    def known(self) -> tuple[str, ...]:
+        """The legs that are compiled."""
+        return tuple(name for name, leg in self.legs.items() if leg is not None or name in self.iterative)
 
     @property
     def is_closed_form(self) -> bool:
@@ -172,7 +180,7 @@ class Batch(Value):
         cones: ArrayLike | None = None,
         *,
         slides: ArrayLike | None = None,
-        compiled: Compiled | None = None,
+        compiled: bool | None = None,
     ) -> Evaluation:
         """Evaluate the batch at platform poses.
 
@@ -189,8 +197,7 @@ class Batch(Value):
             Coordinates (n, m) of the P joints :attr:`has_translation` (m), by which links slide on the platform: then
             the legs on these can be observed as well, and Mᵀ has one more column for each.
         compiled
-            True for numba, False for NumPy, "jax" for jax (default: numba if its kernels are compiled and worth
-            starting).
+            True for numba, False for NumPy (default: numba if its kernels are compiled and worth starting).
 
         Returns
         -------
@@ -222,7 +229,7 @@ class Batch(Value):
         k, n = len(watched), len(X)
         quick = self.may_use_numba(n, watched, half, slid=slid) if compiled is None else compiled
         if compiled:
-            self._require_compilable("jax" if compiled == "jax" else "numba")
+            self._require_compilable()
         given = X if s is None else np.hstack([X[:, :3].reshape(n, 12), s])
         rows = self._program(watched, slid).run(given, ROWS, compiled=quick)
         reached, u = rows[0] > 0, rows[1 : 1 + 3 * k].reshape(k, 3, n)
@@ -281,7 +288,7 @@ class Batch(Value):
 
     def _watched(self, legs: Sequence[str] | str | None, slid: bool = False) -> list[str]:
         names = list(self.legs) if legs is None else legs.split(",") if isinstance(legs, str) else list(legs)
-        known = [name for name, leg in self.legs.items() if leg is not None or (slid and name in self.sliding)]
+        known = [name for name in self.legs if name in self.known or (slid and name in self.sliding)]
         for name in names:
             if name not in known:
                 raise BadRequest("unknown leg of the batch", name, known)
@@ -308,10 +315,10 @@ class Batch(Value):
             and (cones is None or is_bound_compiled(len(legs), self._twists(slid), cones))
         )
 
-    def _require_compilable(self, by: str) -> None:
-        """Raise ``MissingExtra`` where a package is not there, ``BadRequest`` where this batch is not for it."""
-        if find_spec(by) is None:
-            raise MissingExtra(f"compiled={by!r}", EXTRAS[by])
+    def _require_compilable(self) -> None:
+        """Raise ``MissingExtra`` where numba is not there, ``BadRequest`` where this batch is not for it."""
+        if find_spec("numba") is None:
+            raise MissingExtra("compiled=True", "fast")
         if not self.is_closed_form:
             raise BadRequest(
                 "a batch with iterated legs, or with platform twists that change with the pose, is not compiled",
@@ -354,8 +361,10 @@ class Batch(Value):
                         moves[i][j] = moves[i][j] + each
                 for i, each in enumerate(scale(program.number(self.length), way)):
                     moves[i][d - len(slides) + slides.index(link.joint)] = each
-            margin, u, M = compute_direction_rows(leg, p, R, [each for row in moves for each in row], program.number)
+            columns = [([row[j] for row in moves[:3]], [row[j] for row in moves[3:]]) for j in range(d)]
+            margin, u, rates = leg.rates(p, R, columns, program.number)
             found: dict[str, Components] = {f"margin_{name}": [margin]}
+            M = [rate[i] for i in range(3) for rate in rates]
             return found | ({f"u_{name}": u, f"M_{name}": M} if name in watched else {})
 
         def reached(finite: Components, *margins: Components) -> dict[str, Components]:
@@ -367,7 +376,7 @@ class Batch(Value):
         program.apply(pose, "X", *(f"slide_{name}" for name in slides))
         margins = []
         for name, leg in self.legs.items():
-            if isinstance(leg, ClosedFormLeg):
+            if leg is not None:
                 program.apply(partial(leg_rows, name=name, leg=leg), "p", "R")
                 margins.append(f"margin_{name}")
             elif slid and name in self.sliding:
@@ -391,7 +400,7 @@ class Batch(Value):
             here = slice(start, start + POSE_CHUNK_COUNT)
             states = {name: self._follow(leg, X[here]) for name, leg in self.iterative.items()}
             for name in states:
-                if self.legs[name] is self.iterative[name]:
+                if self.legs[name] is None:
                     found, rows, there = states[name].rows()
                     reached[here] &= there
                     if name in watched:
@@ -464,8 +473,7 @@ def _list_leg_forces(
     found: list[LegForce] = []
     for leg in decomposition.legs:
         chain = legs[leg.label]
-        state = np.stack([frames[link] for link in chain.links], axis=1)
-        state[:, :, :3, 3] /= chain.length
+        state = chain.system.read(frames.__getitem__)
         states = IterativeLegStates(chain, coordinates, state, np.zeros(len(state)), R, span)
         holds = list_leg_forces(decomposition.mechanism, leg, coordinates, states, p)
         if holds is None:

@@ -14,7 +14,7 @@ from ..geometry.components import Components, dot, sqrt, where
 from ..geometry.vectors import Array
 from ..tolerances import RANK_CUTOFF_FRACTION
 from .cones import clear_zero, compute_error_along, compute_root, find_largest_eigenvalue, trace_two
-from .program import Compiled, Formula, Program
+from .program import Formula, Program
 from .three_cones import trace_three
 
 PARTS = ("position", "orientation")
@@ -32,7 +32,7 @@ class ErrorBound:
 
 
 def bound_errors(
-    M: Array, twists: Array, cones: Array, reached: NDArray[np.bool_] | None = None, *, compiled: Compiled = False
+    M: Array, twists: Array, cones: Array, reached: NDArray[np.bool_] | None = None, *, compiled: bool = False
 ) -> tuple[ErrorBound, ErrorBound]:
     """Position and orientation error for Mᵀ (3 k, d, n) on ``twists`` (6, d) or (n, 6, d), and half-angles of k cones
     (rad); the position error is in the unit of the twists' linear rows. NaN where not ``reached``."""
@@ -220,7 +220,7 @@ def _build_maximum_program(k: int) -> Program:
     return program
 
 
-def compute_largest_errors(B: Sequence[Array], *, compiled: Compiled = False) -> tuple[Array, Array]:
+def compute_largest_errors(B: Sequence[Array], *, compiled: bool = False) -> tuple[Array, Array]:
     """The largest error and a lower bound of it, (n,) each, for the entries (6, n) of forms B_i."""
     upper, lower = _build_maximum_program(len(B)).run(
         np.stack([each.T for each in B], axis=1), ["maximum"], compiled=compiled

@@ -9,12 +9,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..budgets import FIRST_GRID_CELLS_COUNT, SWEEP_STEP_HALVINGS_MAX
 from ..errors import PoseReachFailure, SamplingFailure
 from ..geometry.ranks import compute_range_basis
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.continuation import CONTINUATION_HALVINGS_MAX, find_nearest, is_goal_dependent, track
+from ..kinematics.continuation import (
+    CONTINUATION_HALVINGS_MAX,
+    FOLD_SINGULAR_VALUE_TOL,
+    GOAL_DIRECTION_CUTOFF_FRACTION,
+    find_nearest,
+    is_goal_dependent,
+    track,
+)
 from ..kinematics.leg_reach import find_beyond_rods, find_worst_leg
 from ..kinematics.limits import find_tilt_at_end, list_tilts_beyond
 from ..kinematics.platform_motion import PlatformMotion, PoseTask
@@ -23,10 +29,15 @@ from ..kinematics.velocity_relation import ObservationModel
 from ..kinematics.walking import walk_randomly
 from ..mechanism.pose import Grid, Pose
 from ..progress import report
-from ..tolerances import FOLD_SINGULAR_VALUE_TOL, GOAL_DIRECTION_CUTOFF_FRACTION, PRINTED_POSE_TOL
+from ..tolerances import PRINTED_POSE_TOL
 
 if TYPE_CHECKING:
     from .configuration_builder import ConfigurationBuilder
+
+FIRST_GRID_CELLS_COUNT = 40
+"""Nearest cells of a grid that are tried from zero before it counts as unreachable."""
+SWEEP_STEP_HALVINGS_MAX = 4
+"""Halvings of a step in a sweep that can reach a pose from several neighbours."""
 
 
 def find_generic_motion(start: ClosedConfiguration, observation_model: ObservationModel) -> PlatformMotion:

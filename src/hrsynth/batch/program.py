@@ -1,5 +1,4 @@
-"""A program for many poses: formulas one after the other on named quantities, in NumPy, compiled by numba or
-jax.
+"""A program for many poses: formulas one after the other on named quantities, in NumPy or compiled by numba.
 
 A name stands for components, each a place of a table (places, poses) or a constant. A formula becomes a kernel of
 straight-line code; a loop repeats one at the poses where a flag, the last of its state, is positive. The sections after
@@ -8,30 +7,23 @@ the first run only at the poses where their flag is positive.
 
 from __future__ import annotations
 
-import hashlib
 import math
-import os
-import sys
-import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import lru_cache
 from itertools import pairwise
-from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
+from ..equations.compiled_module import load_compiled_module, locate_module_file
+from ..equations.tape import TAPE_LANES_COUNT, Store, Symbol, Tape
 from ..geometry.components import Components
 from ..geometry.vectors import Array
 from .sections import Indices, Kernel, KernelLoop, Section, put, take_places
-from .tape import TAPE_LANES_COUNT, Store, Symbol, Tape
 
 POSE_CHUNK_COUNT = 4096
 """Poses that are worked on together, so that their arrays stay in the cache."""
-Compiled = bool | Literal["numba", "jax"]
-"""Compiler of a program: True is numba, False nothing."""
 Formula = Callable[..., Mapping[str, Components]]
 """Function from the components of its inputs to those of its outputs, by name."""
 
@@ -110,7 +102,7 @@ class Program:
             ]
         return Kernel(tape, stores)
 
-    def run(self, inputs: Array, names: Sequence[str], *, compiled: Compiled = False) -> Array:
+    def run(self, inputs: Array, names: Sequence[str], *, compiled: bool = False) -> Array:
         """The components of some names (rows, n) for inputs (n, ...), whose first ``inputs`` numbers are read."""
         flat = inputs.reshape(len(inputs), math.prod(inputs.shape[1:])) if inputs.ndim > 2 else inputs
         outputs = self._outputs(names)
@@ -118,17 +110,12 @@ class Program:
         for row, place in zip(found, outputs, strict=True):
             if not isinstance(place, int):
                 row[:] = place
-        if compiled == "jax":
-            from .on_jax import run
-
-            run(tuple(self.sections), self.numbers, flat[:, : self.inputs], outputs, found)
-        else:
-            (self._run_lanes if compiled else self._run_rows)(flat, outputs, found)
+        (self._run_lanes if compiled else self._run_rows)(flat, outputs, found)
         return found
 
     def is_compiled(self, names: Sequence[str]) -> bool:
         """Return True if numba has compiled the kernels of these names, in this run or in an earlier one."""
-        file = _locate_module_file(self.text(self._outputs(names)))
+        file = locate_module_file(self.text(self._outputs(names)))
         return any(file.parent.glob(f"__pycache__/{file.stem}.sweep*.nbi"))
 
     def _outputs(self, names: Sequence[str]) -> list[Any]:
@@ -276,39 +263,3 @@ def _sweep_of(text: str) -> Callable[..., None]:
     """The sweep of a module's text."""
     sweep: Callable[..., None] = load_compiled_module(text).sweep
     return sweep
-
-
-@lru_cache(maxsize=64)
-def load_compiled_module(text: str) -> Any:
-    """The module of a text, compiled or from numba's cache, which goes by the file that holds the text."""
-    import importlib.util
-
-    from ..description.files import open_replacement
-
-    file = _locate_module_file(text)
-    if not file.exists() or file.read_text(encoding="utf-8") != text:
-        with open_replacement(file) as draft:
-            draft.write_text(text, encoding="utf-8")
-    spec = importlib.util.spec_from_file_location(file.stem, file)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[file.stem] = module  # where numba looks for it when it reads its cache
-    spec.loader.exec_module(module)
-    return module
-
-
-def _locate_module_file(text: str) -> Path:
-    """Return the path of a module's text."""
-    return _choose_cache_folder() / f"kernels_{hashlib.sha256(text.encode()).hexdigest()[:24]}.py"
-
-
-@lru_cache(maxsize=1)
-def _choose_cache_folder() -> Path:
-    """A folder of the user's for compiled kernels; one of this run where that cannot be written."""
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "hrsynth" / "kernels"
-    try:
-        home.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return Path(tempfile.mkdtemp(prefix="hrsynth-"))
-    return home if os.access(home, os.W_OK) else Path(tempfile.mkdtemp(prefix="hrsynth-"))

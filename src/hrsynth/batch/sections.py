@@ -10,9 +10,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..equations.tape import UFUNCS, Store, Tape
 from ..geometry.vectors import Array
 from ..results import Value
-from .tape import UFUNCS, Store, Tape
 
 Indices = NDArray[np.int64]
 

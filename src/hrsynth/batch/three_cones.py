@@ -17,9 +17,11 @@ from __future__ import annotations
 from typing import Any
 
 from ..geometry.components import Components, dot, scale, sqrt, times, where
-from ..tolerances import CONE_SET_GAP_TOL
 from .cones import choose_larger, clear_zero, compute_error_along, find_largest_eigenvalue, trace_root
 from .program import Program
+
+CONE_SET_GAP_TOL = 1e-10
+"""Relative gap between the bounds at which a maximum over three or more cones is found."""
 
 CONE_ASCENT_STEPS_COUNT = 10
 """Steps of the ascent from each of its starts; four times as many follow from the best end."""
