@@ -10,11 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from description.foreign.rounded import of_hinges
 from hrsynth import branch, load, modes
 from hrsynth.analysis.branch.answer import BranchProof
 from hrsynth.analysis.branch.cells import _bound_smallest_value
 from hrsynth.analysis.branch.growth import CellGrid, split_box
 from hrsynth.errors import BadRequest, MotorsNotEnough
+from hrsynth.families.delta import delta
 from hrsynth.geometry.affine import AffineForms, make_affine
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Limits, Mechanism
@@ -85,12 +87,8 @@ def misses(proof: BranchProof, values) -> np.ndarray:
             found.append((X[:3, :3] @ joint.axes[0]) @ (Y[:3, :3] @ joint.axes[1]))
     for coupling in proof.robot.couplings:
         one, other = (
-            next(
-                i
-                for i, c in enumerate(system.coordinates)
-                if c.joint in proof.robot.joints and proof.robot.joints[c.joint].successor == link
-            )
-            for link in (coupling.predecessor, coupling.successor)
+            next(i for i, c in enumerate(system.coordinates) if c.joint == name)
+            for name in (coupling.driver, coupling.driven)
         )
         found.append(values[other] - coupling.ratio * values[one])
     return np.array(found)
@@ -393,7 +391,7 @@ def test_a_gear_comes_back_after_whole_turns_alone(ratio):
         b.link(name)
     b.joint("m", "R", "base", "one", axis=Z, motor=True)
     b.joint("p", "R", "base", "two", (1, 0, 0), axis=Z)
-    b.coupling("g", "one", "two", ratio)
+    b.coupling("g", "m", "p", ratio)
     for platform in ("one", "two"):
         (part,) = branch(b.build(platform=platform)).parts
         assert part.volume_fraction == 1.0
@@ -435,7 +433,7 @@ def test_the_smallest_singular_value_is_bounded_whatever_the_tubes_widths():
     M = rng.uniform(0, 0.2, (200, 4, 4)) * np.minimum(1.0, r[:, :, None] / r[:, None, :])
     E = M * rng.uniform(-1, 1, M.shape)
     exact = np.linalg.svd(np.linalg.solve(Y, np.eye(4) - E), compute_uv=False)[:, -1]
-    bound = _bound_smallest_value(Y, M, r, (M @ r[..., None])[..., 0])
+    bound = _bound_smallest_value(Y, M, r)
     assert np.all(bound <= exact)
     assert np.median(bound / exact) > 0.3
 
@@ -452,3 +450,74 @@ def test_a_thin_box_has_the_bound_of_the_loops_at_its_middle():
     ]
     assert least[0] > 0.1
     assert least[1] >= 0.9 * least[0]
+
+
+def plain_delta() -> Mechanism:
+    return delta(base_radius=0.2, platform_radius=0.06, proximal=0.3, distal=0.65, half_width=0.045, home=HOME)
+
+
+HOME = (0.0, 0.0, -0.3 * math.sin(0.4) - math.sqrt(0.65**2 - (0.14 + 0.3 * math.cos(0.4)) ** 2))
+
+
+def platforms(q: np.ndarray, side: float) -> np.ndarray:
+    """Places (n, 3) of a Delta's platform, where three spheres about its elbows meet, below or above these."""
+    angles = np.array([0, 2, 4]) * np.pi / 3
+    radial = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+    turned = (0.4 - q)[..., None]
+    one, two, three = np.moveaxis((0.14 + 0.3 * np.cos(turned)) * radial - 0.3 * np.sin(turned) * Z, 1, 0)
+    u, v = two - one, three - one
+    n = np.cross(u, v)
+    nn, uu, vv = ((each * each).sum(-1, keepdims=True) for each in (n, u, v))
+    middle = (np.cross(n, u) * vv + np.cross(v, n) * uu) / (2 * nn)
+    height = np.sqrt((0.65**2 - (middle * middle).sum(-1, keepdims=True)) / nn)
+    return one + middle - side * height * n * np.sign(n[:, 2:])
+
+
+@pytest.mark.parametrize(
+    ("half", "count"), [(0.2, 500), pytest.param(0.8, 10000, marks=pytest.mark.long)], ids=["part", "most"]
+)
+def test_a_delta_is_where_three_spheres_meet(half, count):
+    """With balls, and with three R for each: the same cells, and in their tubes the platform below the elbows alone."""
+    box = {f"shoulder_{k}": (-half, half) for k in (1, 2, 3)}
+    one, other = (branch(each, box, max_cells=3000).parts[0] for each in (plain_delta(), of_hinges(plain_delta())))
+    assert one.volume_fraction == other.volume_fraction == 1.0
+    assert len(one.cells) == len(other.cells)
+    q = np.random.default_rng(3).uniform(-half, half, (count, 3))
+    for part in (one, other):
+        slides = [part.passive.index(f"platform.{k}") for k in (1, 2, 3)]
+        below, above = (platforms(q, side) - HOME for side in (1.0, -1.0))
+        for at, is_here, is_elsewhere in zip(q, below, above, strict=True):
+            cell = part.find(at)
+            assert cell is not None
+            assert np.all(np.abs(is_here - cell.at(at)[slides]) <= cell.radius[slides] + 1e-12)
+            assert np.any(np.abs(is_elsewhere - cell.at(at)[slides]) > cell.radius[slides])
+
+
+@pytest.mark.some(1)
+@pytest.mark.parametrize("seed", range(3))
+def test_tilted_robots_of_hinges_follow_small_steps(seed):
+    """Balls as three R, the robot in any direction: closures followed by small steps lie in the tubes of all joints."""
+    rng = np.random.default_rng(seed)
+    X = np.eye(4)
+    X[:3, :3] = random_rotation(rng)
+    robot = plain_delta()
+    turned = replace(
+        robot,
+        links={name: replace(link, pose=X @ link.pose) for name, link in robot.links.items()},
+        joints={
+            name: replace(joint, point=X[:3, :3] @ joint.point, axes=tuple(X[:3, :3] @ axis for axis in joint.axes))
+            for name, joint in robot.joints.items()
+        },
+    )
+    proof = branch(of_hinges(turned), {f"shoulder_{k}": (-0.02, 0.02) for k in (1, 2, 3)}, max_cells=10)
+    (part,) = proof.parts
+    assert part.volume_fraction == 1.0
+    assert part.unsure == ()
+    assert obeys(proof, rng, 1, 3) == 3
+
+
+def test_a_time_limit_ends_with_what_is_proved():
+    """The first cells count; the limits of cells alone give more."""
+    short, long = (branch("rrrrr_m1", max_cells=130, time_limit=limit).parts[0] for limit in (0.0, None))
+    assert 0.0 < short.volume_fraction < long.volume_fraction
+    assert connected(short)

@@ -9,11 +9,11 @@ from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
+from ...equations.joint_equations import LoopSystem
 from ...geometry.vectors import Array
 from ...mechanism import Mechanism
 from ...records import As, Number, Recorded, Shown, Table, recorded
 from ...results import Result, Value
-from .loops import LoopSystem
 
 KEPT, PASSED, OPEN, UNSEEN = "kept", "passed", "undecided", "not looked at"
 """Verdict on a joint limit over the cells."""
@@ -25,6 +25,7 @@ class BranchCell(Value, all_recorded=True):
     """A cell low ≤ q ≤ high (n,) of a part's motors, and the tube |x − centre − slopes (q − middle)| ≤ radius (p,) of
     its passive coordinates that contains exactly one closure for every q of the cell (m, rad).
 
+    The radius of a joint that only turns a rod is infinite where it is not proved to have one value.
     ``weakest`` is a lower bound over the tube of the smallest singular value of D_xG (characteristic lengths, radians;
     the smallest over its triangular blocks); ``neighbours`` are the numbers of the cells with a common face in which
     the closure is proved to be the same.
@@ -34,7 +35,7 @@ class BranchCell(Value, all_recorded=True):
     high: Annotated[Array, list[float]]
     centre: Annotated[Array, list[float]]
     slopes: Annotated[Array, Table, "one row per passive coordinate, one column per motor"]
-    radius: Annotated[Array, list[float]]
+    radius: Annotated[Array, list[float | None], "null: not proved to have one value (a joint that turns a rod)"]
     smallest_singular_value: Annotated[
         float, "lower bound of the smallest singular value of the loop Jacobian over the tube"
     ]
@@ -75,7 +76,7 @@ class BranchLimit(Value, all_recorded=True):
     joint: str
     lower: float | None
     upper: float | None
-    least: Annotated[float | None, "null if its loop is cut there"]
+    least: Annotated[float | None, "null if its loop is cut there, or it is not proved to have one value"]
     most: float | None
     verdict: Annotated[str, Literal["kept", "passed", "undecided", "not looked at"], "kept and passed are proved"]
 
@@ -121,6 +122,12 @@ class BranchPart(Value):
     def percent(self) -> str:
         """The share in per cent, never rounded up to all of it."""
         return "100" if self.volume_fraction == 1.0 else f"{min(100 * self.volume_fraction, 99.9):.3g}"
+
+    @property
+    def unsure(self) -> tuple[str, ...]:
+        """The coordinates that are not proved to have one value in all cells: of joints that only turn rods."""
+        sure = np.all([np.isfinite(cell.radius) for cell in self.cells], axis=0)
+        return tuple(name for name, each in zip(self.passive, sure, strict=True) if not each) if self.cells else ()
 
     def place(self, q: Array) -> str:
         """Motor coordinates (n,) in words."""

@@ -6,12 +6,17 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from ...equations.loop_parts import LoopPart
 from ...geometry.vectors import Array
-from ...tolerances import AFFINE_ROUNDING, TOGGLE_RATE_MIN_FRACTION, TOGGLE_SINGULAR_VALUE_FRACTION
+from ...tolerances import AFFINE_ROUNDING
 from .answer import Toggle
 from .cells import BranchTube, prove_all
 from .growth import BranchEnd, Growth
-from .loop_parts import LoopPart
+
+TOGGLE_SINGULAR_VALUE_FRACTION = 0.03
+"""Fraction of its value at zero at which the loops' smallest singular value ends a path at a toggle."""
+TOGGLE_RATE_MIN_FRACTION = 0.05
+"""Fraction of the largest rate at a toggle from which a joint counts as moving."""
 
 TOGGLE_BISECTIONS_COUNT = 40
 """Number of bisections of the path to a toggle."""
@@ -33,17 +38,20 @@ def find_toggles(growth: Growth) -> tuple[Toggle, ...]:
 
 def _search_toggles(growth: Growth, ends: Sequence[BranchEnd]) -> Iterator[Toggle]:
     """Go from where cells were started through their middles and on, all together; where that ends, a loop toggles."""
-    part = growth.part
+    part, core = growth.part, growth.part.core
     unit = part.system.units[list(part.driven)]
     start, x0 = np.array([end.q for end in ends]), np.array([end.x for end in ends])
+    if x0.shape[1] > len(core.unknowns):
+        x0 = x0[:, core.places_in(part)]
     middle = np.array([(growth.grid.point(end.leaf.low) + growth.grid.point(end.leaf.high)) / 2 for end in ends])
     goal = np.clip(start + TOGGLE_SEARCH_RANGE_FRACTION * (middle - start), growth.grid.low, growth.grid.high)
     home = np.linalg.svd(part.closure(growth.q0, growth.x0)[1], compute_uv=False)[-1]
-    for end, q, x, last in zip(ends, *_follow_ways(part, start, x0, goal), strict=True):
+    q_, x_, parts = _follow_ways(core, start, x0, goal)
+    for end, q, x, last in zip(ends, q_, growth.complete(q_, x_), parts, strict=True):
         _, strengths, rows = np.linalg.svd(part.closure(q, x)[1])
         if last == 1.0 or strengths[-1] / max(home, 1e-300) > TOGGLE_SINGULAR_VALUE_FRACTION:
             why = (
-                "not tried: the cell limit was reached (use a smaller --box or more --max-cells)"
+                "not tried: the limit of cells or of time was reached (use a smaller --box, or raise the limit)"
                 if not end.leaf.failed
                 else "undecided: smaller cells are needed"
             )
@@ -123,8 +131,3 @@ def _check_tubes_meet(growth: Growth, k: int, one: BranchTube, other: BranchTube
         [sum(each.joint == mate.joint and not mate.slides for mate in part.system.coordinates) < 3 for each in own]
     )
     return False if np.any((off - doubt > other.radius) & alone) else None
-
-
-def describe_ends(ends: Sequence[Toggle]) -> list[str]:
-    """Describe the ends of a proof."""
-    return [f"{each.reason}: {', '.join(each.joints)}" if each.joints else each.reason for each in ends]

@@ -9,6 +9,7 @@ are exact.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise, product
@@ -17,16 +18,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...budgets import BRANCH_CELL_INDEX_HALVINGS_MAX
+from ...equations.loop_parts import LoopPart
 from ...geometry.vectors import Array
 from ...progress import report
-from ...tolerances import AFFINE_ROUNDING
-from .cells import BranchTube, prove_all, split_cells
-from .loop_parts import LoopPart
+from .cells import BranchTube, prove_all, prove_turned, split_cells
+
+BRANCH_CELL_INDEX_HALVINGS_MAX = 40
+"""Largest number of halvings of a side, limited by the integer cell index."""
 
 BRANCH_CELLS_BATCH_COUNT = 64
 """Cells that are tried together."""
+BRANCH_POINTS_BATCH_COUNT = 512
+"""Points of common faces that are proved together."""
 Corner = NDArray[np.int64]
+Waiting = tuple["GrownCell", Array, Array]
+"""A cell with a point of it and the closure there, from which it is started."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,18 +83,18 @@ def split_box(grid: CellGrid, start: Array, half: Array, most: int) -> list[Grow
 
     def edges(k: int, rings: int) -> list[int]:
         every = {int(middle[k] + j * reach[k]) for j in range(-2 * rings - 1, 2 * rings + 2, 2)}
-        return sorted({min(max(each, 0), 2**BRANCH_CELL_INDEX_HALVINGS_MAX) for each in every})
+        return sorted({min(max(item, 0), 2**BRANCH_CELL_INDEX_HALVINGS_MAX) for item in every})
 
     rings = [0] * n
     for ring in range(1, most):
         for k in range(n):
             wider = [*rings[:k], ring, *rings[k + 1 :]]
-            if math.prod(len(edges(i, each)) - 1 for i, each in enumerate(wider)) <= most:
+            if math.prod(len(edges(i, item)) - 1 for i, item in enumerate(wider)) <= most:
                 rings = wider
         if max(rings) < ring or all(edges(k, ring) == edges(k, ring + 1) for k in range(n)):
             break
-    sides = [list(pairwise(edges(k, each))) for k, each in enumerate(rings)]
-    cells = [GrownCell(*np.array(each, dtype=np.int64).T) for each in product(*sides)]
+    sides = [list(pairwise(edges(k, item))) for k, item in enumerate(rings)]
+    cells = [GrownCell(*np.array(item, dtype=np.int64).T) for item in product(*sides)]
     cells.sort(key=lambda cell: bool(np.any(cell.low > middle) or np.any(cell.high < middle)))
     low, high = np.array([side[0][0] for side in sides]), np.array([side[-1][1] for side in sides])
     outer_low, outer_high = np.zeros(n, dtype=np.int64), np.full(n, 2**BRANCH_CELL_INDEX_HALVINGS_MAX, dtype=np.int64)
@@ -129,21 +135,22 @@ class Growth:
     endings: list[BranchEnd] = field(default_factory=list)
     tried: int = 0
 
-    def run(self) -> Growth:
-        """Grow until nothing is left to try, or as many cells were tried as are allowed."""
-        waiting: list[tuple[GrownCell, Array, Array]] = [(self.leaves[0], self.q0, self.x0)]
+    def run(self, time_limit: float) -> Growth:
+        """Grow until nothing is left to try, or as many cells were tried, or seconds have passed, as are allowed."""
+        end = time.monotonic() + time_limit
+        waiting: list[Waiting] = [(self.leaves[0], self.q0, self.x0)]
         self.leaves[0].asked = True
-        while waiting and self.tried < self.most:
-            waiting.sort(key=lambda each: (each[0].depth, each[0].low.tolist()))
+        while waiting and self.tried < self.most and (not self.proved or time.monotonic() < end):
+            waiting.sort(key=lambda item: (item[0].depth, item[0].low.tolist()))
             batch, waiting = waiting[:BRANCH_CELLS_BATCH_COUNT], waiting[BRANCH_CELLS_BATCH_COUNT:]
-            coarse = [each for each in batch if self._is_too_coarse(each[0])]
+            coarse = [item for item in batch if self._is_too_coarse(item[0])]
             if coarse:
-                waiting += [each for each in batch if not self._is_too_coarse(each[0])]
-                waiting += [half for each in coarse for half in self._cut(*each)]
+                waiting += [item for item in batch if not self._is_too_coarse(item[0])]
+                waiting += self._cut(coarse)
                 continue
             self.tried += len(batch)
             report("batches of cells")
-            tubes = self._tubes(batch)
+            tubes, cut = self._tubes(batch), list[Waiting]()
             joined = self._join(batch, tubes)
             for (leaf, q, x), tube in zip(batch, tubes, strict=True):
                 if tube is not None and leaf in joined:
@@ -152,7 +159,8 @@ class Growth:
                     leaf.failed = True
                     self.endings.append(BranchEnd(leaf, q, x))
                 else:
-                    waiting += self._cut(leaf, q, x)
+                    cut.append((leaf, q, x))
+            waiting += self._cut(cut)
         self.endings += [BranchEnd(leaf, q, x) for leaf, q, x in waiting]
         return self
 
@@ -165,7 +173,7 @@ class Growth:
     def _is_too_coarse(self, leaf: GrownCell) -> bool:
         return bool(np.max(leaf.high - leaf.low) / self.whole > self.coarsest) and leaf.depth < self.depth
 
-    def _tubes(self, batch: Sequence[tuple[GrownCell, Array, Array]]) -> list[BranchTube | None]:
+    def _tubes(self, batch: Sequence[Waiting]) -> list[BranchTube | None]:
         """The tubes of cells, each about the closure at its middle that its start leads to."""
         low = np.array([self.grid.point(leaf.low) for leaf, *_ in batch])
         high = np.array([self.grid.point(leaf.high) for leaf, *_ in batch])
@@ -184,24 +192,26 @@ class Growth:
                 found[k] = tube
         return found
 
-    def _join(
-        self, batch: Sequence[tuple[GrownCell, Array, Array]], tubes: Sequence[BranchTube | None]
-    ) -> set[GrownCell]:
+    def _join(self, batch: Sequence[Waiting], tubes: Sequence[BranchTube | None]) -> set[GrownCell]:
         """Number those cells whose tubes hold the closure at their starts, and agree with every numbered cell beside
         them; these cells."""
         own = [(leaf, q, x, tube) for (leaf, q, x), tube in zip(batch, tubes, strict=True) if tube is not None]
-        at_start = self._same([(q, x, tube, None) for _, q, x, tube in own])
-        own = [each for each, same in zip(own, at_start, strict=True) if same]
+        # of a cell beside a proved one the common face decides
+        alone = [k for k, (leaf, *_) in enumerate(own) if not any(item.number >= 0 for item in self._beside(leaf))]
+        at_start = [True] * len(own)
+        for k, same in zip(alone, self._same([(*own[k][1:], None) for k in alone]), strict=True):
+            at_start[k] = same
+        own = [item for item, same in zip(own, at_start, strict=True) if same]
         # samples: equations that were left out may depend on the others at zero alone
         for way in (-1.0, 1.0) if self.part.left_out else ():
             corners = [(tube.centre + way * tube.half, tube) for *_, tube in own]
             closed = self._same([(q, tube.at(q), tube, None) for q, tube in corners])
-            own = [each for each, same in zip(own, closed, strict=True) if same]
+            own = [item for item, same in zip(own, closed, strict=True) if same]
         for leaf, _, _, tube in own:
             leaf.tube = tube
         pairs = []
         for place, (leaf, *_) in enumerate(own):
-            later = {id(each[0]) for each in own[place + 1 :]}
+            later = {id(item[0]) for item in own[place + 1 :]}
             pairs += [
                 (leaf, other) for other in self._beside(leaf) if other.tube is not None and id(other) not in later
             ]
@@ -233,18 +243,11 @@ class Growth:
         both): it is then the only zero in them."""
         if not asked:
             return []
-        q = np.array([each[0] for each in asked])
-        x, good = self.part.close(q, np.array([each[1] for each in asked]))
+        q = np.array([item[0] for item in asked])
+        x, good = self.part.close(q, np.array([item[1] for item in asked]))
         points = self._prove(q, np.zeros(q.shape), x, good)
         return [
-            point is not None
-            and all(
-                each is None
-                or bool(
-                    np.all(np.abs(point.x - each.at(point.centre)) + point.radius < each.radius * (1 - AFFINE_ROUNDING))
-                )
-                for each in tubes
-            )
+            point is not None and all(item is None or point.is_within(item) for item in tubes)
             for point, (_, _, *tubes) in zip(points, asked, strict=True)
         ]
 
@@ -273,13 +276,13 @@ class Growth:
 
     def _beside(self, leaf: GrownCell) -> list[GrownCell]:
         """The cells that have a face, or part of one, in common with a cell."""
-        low = np.array([each.low for each in self.leaves])
-        high = np.array([each.high for each in self.leaves])
+        low = np.array([item.low for item in self.leaves])
+        high = np.array([item.high for item in self.leaves])
         common = np.minimum(high, leaf.high) - np.maximum(low, leaf.low)
         touching = np.all(common >= 0, axis=1) & (np.sum(common == 0, axis=1) == 1)
         return [self.leaves[k] for k in np.flatnonzero(touching)]
 
-    def _around(self, leaf: GrownCell) -> list[tuple[GrownCell, Array, Array]]:
+    def _around(self, leaf: GrownCell) -> list[Waiting]:
         """Return the neighbours of a proved cell that were not tried yet, each started at the middle of the common
         face."""
         found = []
@@ -292,40 +295,101 @@ class Growth:
                     found.append(self._start(leaf, other))
         return found
 
-    def _start(self, leaf: GrownCell, other: GrownCell) -> tuple[GrownCell, Array, Array]:
+    def _start(self, leaf: GrownCell, other: GrownCell) -> Waiting:
         """A cell with a point of its face to a proved one and the closure there."""
         assert leaf.tube is not None
         face = self._face(leaf, other)
         return other, face, leaf.tube.at(face)
 
-    def _cut(self, leaf: GrownCell, q: Array, x: Array) -> list[tuple[GrownCell, Array, Array]]:
-        """Halve a cell where the loops change most; the halves that can be started are."""
-        k = self._widest(leaf, x, q)
-        middle = (leaf.low[k] + leaf.high[k]) // 2
-        halves = []
-        for side in (0, 1):
-            low, high = leaf.low.copy(), leaf.high.copy()
-            (high if side == 0 else low)[k] = middle
-            halves.append(GrownCell(low, high, leaf.depth + 1))
-        self.leaves.remove(leaf)
-        self.leaves += halves
-        found = []
-        for half in halves:
-            if np.all(self.grid.point(half.low) <= q) and np.all(q <= self.grid.point(half.high)):
-                half.asked = True
-                found.append((half, q, x))
-                continue
-            beside = [each for each in self._beside(half) if each.tube is not None]
-            if beside:
-                half.asked = True
-                found.append(self._start(max(beside, key=lambda each: each.volume), half))
+    def _cut(self, leaves: Sequence[Waiting]) -> list[Waiting]:
+        """Halve cells where the loops change most; the halves that can be started are."""
+        found: list[Waiting] = []
+        for (leaf, q, x), k in zip(leaves, self._widest(leaves), strict=True):
+            middle = (leaf.low[k] + leaf.high[k]) // 2
+            halves = []
+            for side in (0, 1):
+                low, high = leaf.low.copy(), leaf.high.copy()
+                (high if side == 0 else low)[k] = middle
+                halves.append(GrownCell(low, high, leaf.depth + 1))
+            self.leaves.remove(leaf)
+            self.leaves += halves
+            for half in halves:
+                if np.all(self.grid.point(half.low) <= q) and np.all(q <= self.grid.point(half.high)):
+                    half.asked = True
+                    found.append((half, q, x))
+                    continue
+                beside = [item for item in self._beside(half) if item.tube is not None]
+                if beside:
+                    half.asked = True
+                    found.append(self._start(max(beside, key=lambda item: item.volume), half))
         return found
 
-    def _widest(self, leaf: GrownCell, x: Array, q: Array) -> int:
-        """The side of a cell over which the Jacobian changes most, by the slopes at its start."""
-        width = self.grid.point(leaf.high) - self.grid.point(leaf.low)
-        slopes = np.abs(self.part.slopes(q, x)).sum(axis=0) + np.array([1.0] * len(self.part.driven))
-        return int(np.argmax(width * slopes))
+    def _widest(self, leaves: Sequence[Waiting]) -> list[int]:
+        """The side of each cell over which the Jacobian changes most, by the slopes at its start."""
+        if not leaves:
+            return []
+        width = np.array([self.grid.point(leaf.high) - self.grid.point(leaf.low) for leaf, _, _ in leaves])
+        slopes = self.part.slopes(np.array([q for _, q, _ in leaves]), np.array([x for _, _, x in leaves]))
+        return np.argmax(width * (np.abs(slopes).sum(axis=1) + 1.0), axis=-1).tolist()
+
+    def extend(self, part: LoopPart) -> None:
+        """Give the proved tubes of a core the joints of the whole part that turn rods: from the start on, one cell from
+        the other. Where the joints of a cell are not those of one before it, their radius is infinite."""
+        core = part.core.places_in(part)
+        if len(core) == len(part.unknowns):
+            return
+        turned = [k for k in range(len(part.unknowns)) if k not in core]
+        x0 = part.system.zero[list(part.unknowns)]
+        x0[core] = self.x0
+        layer, reached = [(self.proved[0], self.q0, x0)] if self.proved else [], {0}
+        while layer:
+            tubes = [leaf.tube for leaf, _, _ in layer if leaf.tube is not None]
+            q, x = np.array([q for _, q, _ in layer]), np.array([x for _, _, x in layer])
+            centre = np.array([tube.centre for tube in tubes])
+            x = part.follow(q, part.close(q, x)[0], centre)[0]
+            x[:, core] = [tube.x for tube in tubes]
+            ahead = []
+            for (leaf, _, _), tube in zip(layer, prove_turned(part, tubes, x), strict=True):
+                leaf.tube = tube
+                for number in sorted(leaf.neighbours - reached):
+                    reached.add(number)
+                    face = self._face(leaf, self.proved[number])
+                    ahead.append((self.proved[number], face, tube.at(face)))
+            layer = ahead
+        pairs = [
+            (leaf, self.proved[number])
+            for leaf in self.proved
+            for number in leaf.neighbours
+            if number < leaf.number and leaf.tube is not None and np.isfinite(leaf.tube.radius[turned]).any()
+        ]
+        for k in range(0, len(pairs), BRANCH_POINTS_BATCH_COUNT):
+            some = pairs[k : k + BRANCH_POINTS_BATCH_COUNT]
+            q = np.array([self._face(*pair) for pair in some])
+            both = [(one.tube, other.tube) for one, other in some if one.tube is not None and other.tube is not None]
+            x, _ = part.close(q, np.array([tubes[0].at(at) for tubes, at in zip(both, q, strict=True)]))
+            known = {
+                place: item
+                for place, item in enumerate(prove_all(part.core, q, np.zeros(q.shape), x[:, core]))
+                if item is not None
+            }
+            points = dict(zip(known, prove_turned(part, list(known.values()), x[list(known)]), strict=True))
+            for place, (one, other) in enumerate(both):
+                sure = np.isfinite(one.radius) & np.isfinite(other.radius)
+                if place not in points or not all(points[place].is_within(item, sure) for item in (one, other)):
+                    one.radius[turned] = np.inf
+        self.part, self.x0 = part, x0
+
+    def complete(self, q: Array, x: Array) -> Array:
+        """The unknowns of the whole part at closed configurations (c, n), (c, p) of its core, from the nearest
+        cells."""
+        x_all = np.tile(self.x0, (len(q), 1))
+        if self.proved:
+            tubes = [leaf.tube for leaf in self.proved if leaf.tube is not None]
+            centres = np.array([tube.centre for tube in tubes])
+            nearest = [int(np.argmin(np.linalg.norm(centres - at, axis=1))) for at in q]
+            x_all = np.array([tubes[k].x for k in nearest])
+        x_all[:, self.part.core.places_in(self.part)] = x
+        return self.part.close(q, x_all)[0]
 
 
 def find_largest_box(growth: Growth) -> tuple[Corner, Corner]:
@@ -333,8 +397,8 @@ def find_largest_box(growth: Growth) -> tuple[Corner, Corner]:
     cells = [leaf for leaf in growth.proved]
     first = cells[0]
     low, high = first.low.copy(), first.high.copy()
-    lows = np.array([each.low for each in cells])
-    highs = np.array([each.high for each in cells])
+    lows = np.array([item.low for item in cells])
+    highs = np.array([item.high for item in cells])
 
     def covered(a: Corner, b: Corner) -> bool:
         common = np.minimum(highs, b) - np.maximum(lows, a)

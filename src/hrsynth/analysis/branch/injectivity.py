@@ -22,14 +22,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...budgets import (
-    INJECTIVITY_BOXES_MAX,
-    INJECTIVITY_CELLS_MAX,
-    INJECTIVITY_SIDE_STEPS_COUNT,
-    INJECTIVITY_TRIALS_MAX,
-)
+from ...equations.joint_equations import LoopSystem, rotate
+from ...equations.loop_parts import LoopPart
 from ...geometry.affine import AffineForms, combine, make_affine, stack
 from ...geometry.vectors import Array
+from ...solving.krawczyk import bound_contraction, bound_image
 from ...tolerances import AFFINE_ROUNDING
 from .cells import (
     BranchTube,
@@ -41,8 +38,15 @@ from .cells import (
     stack_tubes,
 )
 from .growth import BRANCH_CELLS_BATCH_COUNT, Growth, find_largest_box
-from .loop_parts import LoopPart
-from .loops import LoopSystem, rotate
+
+INJECTIVITY_CELLS_MAX = 256
+"""Cells of all motors in the proof that the inverse map is unique."""
+INJECTIVITY_TRIALS_MAX = 5000
+"""Sets and pairs of cells tried in that proof."""
+INJECTIVITY_BOXES_MAX = 12
+"""Boxes tried for the inverse map, each 0.7 of the one before."""
+INJECTIVITY_SIDE_STEPS_COUNT = 6
+"""Enlargements of a side of such a box."""
 
 Places = NDArray[np.int64]
 
@@ -75,11 +79,11 @@ class PosedCells:
             return False
         Z = np.linalg.pinv((low.min(axis=0) + high.max(axis=0)) / 2)
         one = np.eye(len(Z))
-        N = np.asarray((one - combine(Z[None], part)).size.max(axis=0))
+        N = bound_contraction(Z[None], part).max(axis=0)
         if not np.all(np.isfinite(N)) or np.abs(np.linalg.eigvals(N)).max() >= 1:
             return False
         v = np.linalg.solve(one - N, np.ones(len(one)))
-        return bool(np.all(v > 0) and np.all((N @ v) * (1 + AFFINE_ROUNDING) < v))
+        return bool(np.all(v > 0) and np.all(bound_image(0 * v, N, v) < v))
 
 
 @dataclass(eq=False)
@@ -303,16 +307,14 @@ class SlopedPart:
         """Return those of tubes; infinite bounds where none is found."""
         trial = stack_tubes(part, tubes)
         equations = [
-            each
-            for block in part.blocks
-            for each in (block.equations if block.loop is None else list_rotating_equations(trial, block))
+            each for block in part.blocks for each in (block.equations or list_rotating_equations(trial, block))
         ]
         at = evaluate_derivatives(trial, equations, range(len(part.unknowns)), trial.radius)
         drift = AffineForms(
             at.along.v / trial.half[:, None, :], (at.along.r + AFFINE_ROUNDING * at.along.size) / trial.half[:, None, :]
         )
         Y = np.linalg.pinv(at.by_own.v[0])
-        M, w = (np.eye(Y.shape[-1]) - combine(Y, at.by_own)).size, combine(Y, drift).size
+        M, w = bound_contraction(Y, at.by_own), combine(Y, drift).size
         # A E = −(B + A S): |E| ≤ M |E| + w, so |E| ≤ v for each v > M v + w
         v = 1.01 * np.linalg.pinv(np.eye(Y.shape[-1]) - M) @ (w + AFFINE_ROUNDING)
         good = np.all((v > 0) & ((M @ v + w) * (1 + AFFINE_ROUNDING) < v), axis=(1, 2), keepdims=True)

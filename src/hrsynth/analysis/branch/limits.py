@@ -36,7 +36,8 @@ def list_branch_limits(
             least, most = float((x - swing - r).min()), float((x + swing + r).max())
             passed = (x - swing + r).min() < lower or (x + swing - r).max() > upper
             verdict = KEPT if lower <= least and most <= upper else PASSED if passed else OPEN
-            yield BranchLimit(name, lower, upper, least, most, verdict)
+            bounded = np.isfinite(least)
+            yield BranchLimit(name, lower, upper, least if bounded else None, most if bounded else None, verdict)
         elif name in held:
             offset = robot.joints[name].offset
             at = 0.0 if offset is None else float(offset[0])

@@ -7,8 +7,9 @@ from typing import Annotated
 
 import numpy as np
 
-from ...budgets import BRANCH_BOX_WIDTH_MAX, BRANCH_CELL_DEPTH_MAX, BRANCH_CELL_SIZE_FRACTION, BRANCH_CELLS_MAX
 from ...description.assembly.zero_configuration import at_file_zero
+from ...equations.joint_equations import LoopSystem, build_loop_system
+from ...equations.loop_parts import LoopPart, evaluate_all_equations, split_loop_system
 from ...errors import BadMechanism, BadRequest, LoopClosureFailure
 from ...geometry.vectors import Array
 from ...mechanism import Mechanism
@@ -23,9 +24,16 @@ from .ends import find_toggles, list_full_turns
 from .growth import CellGrid, GrownCell, Growth, find_largest_box, make_whole_cell, split_box
 from .injectivity import prove_injective_box
 from .limits import list_branch_limits
-from .loop_parts import LoopPart, evaluate_all_equations, split_loop_system
-from .loops import LoopSystem, build_loop_system
 from .redundant import bound_closure_error, list_unexplained_equations
+
+BRANCH_CELLS_MAX = 1000
+"""Largest number of cells of motor coordinates in the proof of a branch, per part of the loops."""
+BRANCH_BOX_WIDTH_MAX = 1000.0
+"""Widest interval of a motor (radians, characteristic lengths) of a branch."""
+BRANCH_CELL_DEPTH_MAX = 7
+"""Largest number of halvings of a cell per motor."""
+BRANCH_CELL_SIZE_FRACTION = 2.0
+"""Largest cell tried, as a multiple of the largest one proved around zero."""
 
 GROUPS = "motion of the links in a subgroup of lower dimension"
 BOUNDED = "bounded over the tubes"
@@ -43,12 +51,24 @@ MotorBox = Annotated[
 Cells = Annotated[int, option("Largest number of cells to try for each part of the loops.", "COUNT", low=1)]
 
 
+TimeLimit = Annotated[
+    float | None,
+    option(
+        "Seconds after which no more cells are tried (default: none, so that no machine changes the result).",
+        "SECONDS",
+        low=0,
+    ),
+]
+
+
 @analysis(
     60,
     examples=("rrrrr_m1 --box shoulder_1=-0.2:0.2,shoulder_2=-0.2:0.2",),
     seeded=False,
 )
-def branch(robot: RobotLike, box: MotorBox = None, *, max_cells: Cells = BRANCH_CELLS_MAX) -> BranchProof:
+def branch(
+    robot: RobotLike, box: MotorBox = None, *, max_cells: Cells = BRANCH_CELLS_MAX, time_limit: TimeLimit = None
+) -> BranchProof:
     """Prove that the passive joints are a function of the motors on the branch of the zero configuration.
 
     Parameters
@@ -60,6 +80,8 @@ def branch(robot: RobotLike, box: MotorBox = None, *, max_cells: Cells = BRANCH_
         without them a full turn, or plus and minus a characteristic length.
     max_cells
         Largest number of cells to try for each part of the loops.
+    time_limit
+        Seconds after which no more cells are tried, for each part of the loops; None: no limit.
 
     Returns
     -------
@@ -84,6 +106,14 @@ def branch(robot: RobotLike, box: MotorBox = None, *, max_cells: Cells = BRANCH_
     >>> hrsynth.branch("rrrrr_m1", {"shoulder_1": (-0.05, 0.05), "shoulder_2": (-0.05, 0.05)})
     <BranchProof: rrrrr_m1, 2 motors, 2 passive coordinates: shoulder_1, shoulder_2: 100 % of the box proved, 1 cell>
     """
+    return prove_branch(robot, box, max_cells, time_limit)
+
+
+def prove_branch(
+    robot: RobotLike, box: BoxLike | None, max_cells: int, time_limit: float | None = None, whole: bool = False
+) -> BranchProof:
+    """The branch of a robot as :func:`branch` proves it; ``whole``: no cell counts in which a joint that turns a rod is
+    not proved to have one value."""
     if max_cells < 1:
         raise BadRequest("--max-cells", max_cells, "1 or more")
     given = read_robot(robot)
@@ -94,26 +124,30 @@ def branch(robot: RobotLike, box: MotorBox = None, *, max_cells: Cells = BRANCH_
     asked = parse_box(box)
     if not all(low <= _read_zero(mechanism, name) <= high for name, (low, high) in asked.items()):
         mechanism = at_file_zero(mechanism) or mechanism
-    system, parts, held = _choose_shape(mechanism, motors, box)
+    system, parts, held = choose_shape(mechanism, motors, box, whole)
     intervals, source = _read_box(system, box)
     found, grown = [], []
     for part in parts:
-        grid, coarsest = _build_grid(part, intervals), BRANCH_CELL_SIZE_FRACTION * _estimate_reach(part, intervals)
-        q0, x0 = (system.zero[list(places)] for places in (part.driven, part.unknowns))
+        core = part if whole else part.core
+        grid, coarsest = _build_grid(part, intervals), BRANCH_CELL_SIZE_FRACTION * _estimate_reach(core, intervals)
+        q0, x0 = (system.zero[list(places)] for places in (core.driven, core.unknowns))
         growth = Growth(
-            part,
+            core,
             grid,
             q0,
             x0,
-            _limit_depth(part),
+            BRANCH_CELL_DEPTH_MAX * (1 + len(part.driven)),
             max_cells,
             coarsest,
             _list_first_cells(grid, q0, coarsest, max_cells),
-        ).run()
+        ).run(np.inf if time_limit is None else time_limit)
         grown.append(growth)
-        found.append(_answer(part, growth))
         report("parts")
     back, regular = prove_injective_box(system, grown)
+    for part, growth in zip(parts, grown, strict=True):
+        if growth.part is not part:
+            growth.extend(part)
+        found.append(_answer(part, growth))
     units, names = system.units[list(system.driven)], system.names
     passive = tuple(names[i] for part in parts for i in part.unknowns)
     idle = tuple(names[i] for i in held)
@@ -135,7 +169,7 @@ def branch(robot: RobotLike, box: MotorBox = None, *, max_cells: Cells = BRANCH_
 Shaped = tuple[LoopSystem, tuple[LoopPart, ...], tuple[int, ...]]
 
 
-def _choose_shape(mechanism: Mechanism, motors: Sequence[str], box: BoxLike | None) -> Shaped:
+def choose_shape(mechanism: Mechanism, motors: Sequence[str], box: BoxLike | None, whole: bool) -> Shaped:
     """The loops in the coordinates in which the larger cell about zero is proved: those of the joints alone, or with
     the pose of the platform, seen from which all legs are alike."""
     system = build_loop_system(mechanism, motors).as_filed
@@ -154,7 +188,12 @@ def _choose_shape(mechanism: Mechanism, motors: Sequence[str], box: BoxLike | No
     posed: Shaped = (other, *split_loop_system(other))
     if len(posed[1]) != 1:
         return joints
-    return max((joints, posed), key=lambda each: _estimate_reach(each[1][0], _read_box(each[0], box)[0]))
+
+    def reach(shape: Shaped) -> float:
+        (part,) = shape[1]
+        return _estimate_reach(part if whole else part.core, _read_box(shape[0], box)[0])
+
+    return max((joints, posed), key=reach)
 
 
 def _estimate_reach(part: LoopPart, intervals: Mapping[int, tuple[float, float]]) -> float:
@@ -176,10 +215,6 @@ def _list_first_cells(grid: CellGrid, zero: Array, coarsest: float, max_cells: i
         return make_whole_cell(n)
     half = coarsest / BRANCH_CELL_SIZE_FRACTION * np.minimum(grid.high - grid.low, 2 * np.pi) / 2
     return split_box(grid, zero, half, max_cells)
-
-
-def _limit_depth(part: LoopPart) -> int:
-    return BRANCH_CELL_DEPTH_MAX * (1 + len(part.driven))
 
 
 def _build_grid(part: LoopPart, intervals: Mapping[int, tuple[float, float]]) -> CellGrid:

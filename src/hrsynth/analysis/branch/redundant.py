@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...equations.joint_equations import JointLoop, LoopSystem, list_joint_parts
+from ...equations.loop_parts import LoopEquation, LoopPart, evaluate_equations
 from ...geometry.ranks import compute_range_basis
 from ...geometry.vectors import Array
 from ...mechanism import JointType
-from .cells import BranchTube, evaluate_equations, stack_tubes
-from .loop_parts import LoopEquation, LoopPart
-from .loops import JointLoop, LoopSystem, list_joint_parts
+from .cells import BranchTube, stack_tubes
 
 
 def list_unexplained_equations(part: LoopPart) -> tuple[LoopEquation, ...]:
@@ -67,7 +67,7 @@ def bound_closure_error(part: LoopPart, tubes: Sequence[BranchTube], equations: 
     if not equations or not tubes:
         return 0.0
     trial = stack_tubes(part, tubes)
-    values, _ = evaluate_equations(part, equations, trial.forms(trial.radius))
+    values, _ = evaluate_equations(part.system, equations, trial.forms(trial.radius))
     bound = 0.0
     for each, value in zip(equations, values, strict=True):
         size = float(np.max(value.size))
