@@ -212,7 +212,11 @@ def test_a_grid_is_its_single_poses_and_leaves_out_what_is_behind_the_camera(tmp
     [
         ("point", {}, "the measurement bounds are missing"),
         ("point", {"cone": "0.1deg"}, "applies to directions only"),
-        ("direction", {"cone": "0.1deg"}, "not to position"),
+        (
+            "direction",
+            {"cone": "0.1deg"},
+            r"--cone bounds directions only; observation \S+ \(position\) has no bound. Add --noise",
+        ),
         ("point", {"noise": "1mm"}, "in lengths"),
         ("point", {"noise": "0.3km"}, "not a number"),
     ],

@@ -186,7 +186,6 @@ def test_json_is_the_contract(capsys: pytest.CaptureFixture[str], tmp_path: Path
     assert len(data["modes"]) == 4
     assert data["pairs"][3]["modes"] == [2, 3]
     assert data["pairs"][3]["path"]["margin"] > 0
-    assert data["section"]["reason"]
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 

@@ -26,7 +26,7 @@ def five_bar(ratio: float, seed: int = 0, sense: int = 1) -> tuple[Mechanism, Ar
     b.joint("C", "R", "coupler", "floating", at=at[2], axis=(0, 0, 1), loop=True)
     b.joint("D", "R", "driven", "floating", at=at[3], axis=(0, 0, 1))
     b.joint("E", "R", "base", "driven", at=at[4], axis=(0, 0, sense))
-    b.coupling("gear", "crank", "driven", ratio * sense)
+    b.coupling("gear", "A", "E", ratio * sense)
     b.observe("1", "coupler", (*(P[2] - P[1]), 0))
     return b.build(platform="floating"), P[:, 0] + 1j * P[:, 1]
 

@@ -8,9 +8,10 @@ import sympy
 from flint import arb, ctx
 
 from hrsynth.analysis.modes.loci import Circle, Curve, Line, Point
-from hrsynth.analysis.modes.polynomials import Equation, cycle, krawczyk, pair
+from hrsynth.analysis.modes.polynomials import Equation, cycle, pair
 from hrsynth.analysis.modes.rigid import Planar, Spatial
 from hrsynth.errors import BadRequest
+from hrsynth.solving.krawczyk import enclose_zero
 
 x, y, z = sympy.symbols("x y z")
 
@@ -64,7 +65,7 @@ def circle_and_line(squared: float) -> list[Equation]:
 
 def test_a_simple_solution_is_enclosed():
     with ctx.workprec(128):
-        box = krawczyk(circle_and_line(2.0), [arb(1.0000001), arb(0.9999999)])
+        box = enclose_zero(circle_and_line(2.0), [arb(1.0000001), arb(0.9999999)])
         assert box is not None
         assert all(each.contains(1) and each.rad() < 1e-12 for each in box)
 
@@ -73,16 +74,16 @@ def test_an_enclosure_holds_for_all_coefficients_in_their_balls():
     with ctx.workprec(128):
         equations = circle_and_line(2.0)
         equations[0].table[0, 0] = arb(-2, 1e-3)
-        box = krawczyk(equations, [arb(1), arb(1)])
+        box = enclose_zero(equations, [arb(1), arb(1)])
         assert box is not None
         assert all(each.contains(arb(1.0004).sqrt()) and each.contains(arb(0.9996).sqrt()) for each in box)
 
 
 def test_no_enclosure_where_there_is_no_or_a_double_solution():
     with ctx.workprec(128):
-        assert krawczyk(circle_and_line(0.0), [arb(0), arb(0)]) is None
-        assert krawczyk(circle_and_line(0.0), [arb(1e-9), arb(1e-9)]) is None
-        assert krawczyk(circle_and_line(-1.0), [arb(1), arb(1)]) is None
+        assert enclose_zero(circle_and_line(0.0), [arb(0), arb(0)]) is None
+        assert enclose_zero(circle_and_line(0.0), [arb(1e-9), arb(1e-9)]) is None
+        assert enclose_zero(circle_and_line(-1.0), [arb(1), arb(1)]) is None
 
 
 @pytest.mark.parametrize("curve", [Line((0, 0, 1), (1, 2, 2)), Circle((1, 2, 3), (1, 1, 0), 0.5), Point((1, 2, 3))])

@@ -12,7 +12,7 @@ from analysis.modes.ankles import LEGS, ankle, carried, counted
 from analysis.modes.test_robots import check_completeness, check_modes, same_modes
 from analysis.modes.test_surfaces import needs_msolve
 from hrsynth.analysis.measured import MeasuredRobot
-from hrsynth.analysis.modes.carrying_leg import carried_platform as carried_platform
+from hrsynth.analysis.modes.carrying_leg import carried_platform
 from hrsynth.analysis.modes.carrying_leg_modes import polish_zeros, proposals
 from hrsynth.analysis.modes.joint_forms import closings_bound, eigenvalues
 from hrsynth.errors import UnsupportedLocus
@@ -116,12 +116,12 @@ def test_three_joints_and_three_balls_have_their_number_of_modes(word: str, on: 
 @pytest.mark.parametrize("word", ["RR", "PR", "RP"])
 def test_ranks_and_degrees_leave_the_same_number(word: str):
     for seed in range(2, 4):
-        measured = MeasuredRobot.of_motors(hrsynth.observe(carried(word, seed)))
+        measured = MeasuredRobot.of(hrsynth.observe(carried(word, seed)), real=True)
         system = carried_platform(measured, measured.setup.all_samples.start, 1e-12)
         counted = closings_bound(system, system.square)
         assert counted is not None
         assert counted.most == system.most(system.square)
-        found = polish_zeros(system, eigenvalues(system, system.square, counted))
+        found = polish_zeros(system, [eigenvalues(system, system.square, counted)])
         others = proposals(system, counted.most)
         assert len(found) == len(others) == counted.most
         for q in others:
@@ -134,7 +134,7 @@ def test_how_a_robot_stands_does_not_change_what_its_leg_leaves(seed: int):
     rng, robot, axis = np.random.default_rng(seed), carried("RR", 2), np.array([0.0, 0.0, 1.0])
     robot = robot.changed(joints=[replace(robot.joints[f"joint_{k}"], axes=(axis,)) for k in range(2)])
     R = random_rotation(rng)
-    measured = MeasuredRobot.of_motors(hrsynth.observe(transformed(robot, R, rng.normal(size=3)), samples=4))
+    measured = MeasuredRobot.of(hrsynth.observe(transformed(robot, R, rng.normal(size=3)), samples=4), real=True)
     system = carried_platform(measured, measured.setup.all_samples.start, 1e-12)
     counted = closings_bound(system, system.square)
     assert counted is not None
@@ -147,7 +147,7 @@ def test_how_a_robot_stands_does_not_change_what_its_leg_leaves(seed: int):
 def test_motors_on_all_joints_of_a_leg_leave_it_no_way():
     robot = carried("RR", 2)
     driven = robot.changed(joints=[replace(robot.joints[f"joint_{k}"], motor=Motor(f"motor_{k}")) for k in range(2)])
-    measured = MeasuredRobot.of_motors(hrsynth.observe(driven, samples=4))
+    measured = MeasuredRobot.of(hrsynth.observe(driven, samples=4), real=True)
     with pytest.raises(UnsupportedLocus):
         carried_platform(measured, measured.setup.all_samples.start, 1e-12)
 

@@ -21,9 +21,10 @@ import numpy as np
 import pytest
 from flint import acb, arb, ctx, nmod_mat
 
-from hrsynth.analysis.modes.polynomials import Quadric, krawczyk
+from hrsynth.analysis.modes.polynomials import Quadric
 from hrsynth.geometry.vectors import Array
 from hrsynth.mechanism.observations.point import ImagePoint
+from hrsynth.solving.krawczyk import enclose_zero
 
 PRIME = (1 << 62) - 57
 UNITS = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
@@ -156,7 +157,7 @@ def places(seed: int) -> tuple[list[Array], int]:
         for x in proposed(points, np.random.default_rng(seed), most(points) + 4):
             is_real = np.abs(x.imag).max() < 1e-9 * np.abs(x).max()
             values = x[1:]
-            box = krawczyk(system, [arb(v.real) if is_real else acb(v.real, v.imag) for v in values])
+            box = enclose_zero(system, [arb(v.real) if is_real else acb(v.real, v.imag) for v in values])
             assert box is not None
             boxes.append(box)
             if is_real:

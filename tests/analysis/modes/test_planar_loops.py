@@ -47,7 +47,7 @@ def planar() -> list[str]:
 
 
 def measured(found: AssemblyModes) -> MeasuredRobot:
-    return (MeasuredRobot.of_motors if found.kind == "real" else MeasuredRobot.of_directions)(found.setup)
+    return MeasuredRobot.of(found.setup, found.kind == "real")
 
 
 @pytest.mark.some(2)
@@ -150,7 +150,7 @@ def test_a_six_bar_of_two_loops(motor: str, platform: str, count: int, loops: in
     one, coupler curve and circle meet in six; the last bar has two places for each of the four-bar's."""
     mechanism = linkage(STEPHENSON, LINKS, platform, motor)
     observed = hrsynth.observe(mechanism)
-    driven = MeasuredRobot.of_motors(observed)
+    driven = MeasuredRobot.of(observed, real=True)
     system = planar_loops(driven, observed.all_samples.start)
     assert len(system.loops) == loops
     _, found = solve_loops(driven, observed.all_samples.start)
@@ -184,7 +184,7 @@ def test_slides_that_are_coupled():
         [(0, 0), (1.5, 0), (0, 0.2), (1.5, 0.2), (0.6, 1.1)],
         {"base": [0, 1], "left": [0, 2], "right": [1, 3], "one": [2, 4], "other": [3, 4]},
     )
-    mechanism = linkage(points, links, "other", "j0", {0: (1, 0), 1: (1, 0)}, [("left", "right", 2.0)])
+    mechanism = linkage(points, links, "other", "j0", {0: (1, 0), 1: (1, 0)}, [("j0", "j1", 2.0)])
     found = hrsynth.modes(mechanism, real=True)
     assert (found.found.complete, found.found.complex, len(found.modes)) == (True, 2, 2)
     assert found.found.proof.startswith("1 loop, 2 angles and 0 slides: ")
@@ -194,11 +194,11 @@ def test_what_has_no_loops_says_why():
     for ratio, reason in ((np.sqrt(2.0), "is not a quotient of whole"), (7.0, "is not a quotient of whole")):
         observed = hrsynth.observe(five_bar(ratio)[0], "1")
         with pytest.raises(UnsupportedLocus, match=reason):
-            planar_loops(MeasuredRobot.of_directions(observed), observed.all_samples.start)
+            planar_loops(MeasuredRobot.of(observed), observed.all_samples.start)
         assert not hrsynth.modes(observed).found.complete
     observed = hrsynth.observe("delta")
     with pytest.raises(UnsupportedLocus, match="not one of a planar mechanism"):
-        planar_loops(MeasuredRobot.of_directions(observed), observed.all_samples.start)
+        planar_loops(MeasuredRobot.of(observed), observed.all_samples.start)
 
 
 def test_what_is_too_large_says_its_size():

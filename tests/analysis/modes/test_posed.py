@@ -40,9 +40,9 @@ def measured(word, legs, seed=0):
     """Some legs of a word watched, or its motors (no legs)."""
     setup = observe(build_mechanism(parse(word), seed), samples=4)
     if not legs:
-        return MeasuredRobot.of_motors(setup)
+        return MeasuredRobot.of(setup, real=True)
     seen = tuple(o for o in setup.segments if o.leg in legs)
-    return MeasuredRobot.of_directions(replace(setup, observed=seen))
+    return MeasuredRobot.of(replace(setup, observed=seen))
 
 
 def distance(one, other, length):
@@ -248,7 +248,7 @@ def test_a_body_that_turns_about_a_point_has_eight_modes(seed: int):
     found = modes(spherical(np.random.default_rng(seed)), real=True)
     assert (found.found.complete, found.found.complex) == (True, 8)
     others = search(
-        found.goal, MeasuredRobot.of_motors(found.setup).observation_model, list_leg_ends(found.setup.decomposition)
+        found.goal, MeasuredRobot.of(found.setup, real=True).observation_model, list_leg_ends(found.setup.decomposition)
     )
     for mode in others.modes:
         assert (
@@ -270,6 +270,6 @@ def test_a_body_that_turns_about_a_point_has_one_mode_where_its_rods_are_watched
         found = modes(spherical(np.random.default_rng(seed)), legs)
         assert (found.found.complete, found.found.complex, len(found.modes)) == (True, 1, 1)
     others = search(
-        found.goal, MeasuredRobot.of_directions(found.setup).observation_model, list_leg_ends(found.setup.decomposition)
+        found.goal, MeasuredRobot.of(found.setup).observation_model, list_leg_ends(found.setup.decomposition)
     )
     assert len(others.modes) == 1

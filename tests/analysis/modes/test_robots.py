@@ -12,7 +12,7 @@ import pytest
 from analysis.modes.closings import asked, bodies_of, compared, distance, motor_places
 from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.measured import MeasuredRobot
-from hrsynth.analysis.modes.branches import Model
+from hrsynth.analysis.modes.branches import MODES_TIME_LIMIT_S, Model
 from hrsynth.analysis.modes.carrying_leg_modes import solve_carried
 from hrsynth.analysis.modes.goal_error import drift
 from hrsynth.analysis.modes.methods import solve_tips, without_couplings
@@ -23,7 +23,6 @@ from hrsynth.analysis.modes.single_loop import solve_loop
 from hrsynth.analysis.modes.solve import SystemModes
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.pose_requests import observe as watched
-from hrsynth.budgets import MODES_TIME_LIMIT_S
 from hrsynth.description import list_robots, load
 from hrsynth.errors import (
     BadRequest,
@@ -357,7 +356,7 @@ def test_couplings_in_space_rule_poses_out(name: str, one: str, other: str, rati
     ends = [robot.joints[joint] for joint in (one, other)]
     coupled = robot.changed(
         joints=[replace(ends[1], motor=None)],
-        couplings=(Coupling("gear", ends[0].successor, ends[1].successor, ratio),),
+        couplings=(Coupling("gear", one, other, ratio),),
     )
     found, free = modes(coupled, real=real), modes(robot, real=real)
     assert found.found.complex == free.found.complex
@@ -388,7 +387,7 @@ def test_a_coupling_that_is_left_open_is_named():
     robot = load(list_robots()["3rps"])
     ends = [robot.joints[joint] for joint in ("slide_2", "slide_1")]
     coupled = robot.changed(
-        joints=[replace(ends[1], motor=None)], couplings=(Coupling("gear", ends[0].successor, ends[1].successor, 1.0),)
+        joints=[replace(ends[1], motor=None)], couplings=(Coupling("gear", "slide_2", "slide_1", 1.0),)
     )
     found, free = modes(coupled), modes(robot)
     assert any(mode.open_couplings for mode in found.modes)
@@ -434,12 +433,12 @@ def test_a_joint_that_a_coupling_holds_apart_from_another_is_no_joint_without_it
     coupled = robot.changed(
         links=[replace(robot.links[slide.successor], name=stage)],
         joints=[replace(slide, successor=stage), inner],
-        couplings=(Coupling("belt", stage, slide.successor, 1.0),),
+        couplings=(Coupling("belt", slide.name, inner.name, 1.0),),
     )
     setup = watched(coupled)
     assert stage in setup.mechanism.links
-    assert without_couplings(MeasuredRobot.of_motors(setup), setup.all_samples.start) is None
-    assert without_couplings(MeasuredRobot.of_directions(setup), setup.all_samples.start) is not None
+    assert without_couplings(MeasuredRobot.of(setup, real=True), setup.all_samples.start) is None
+    assert without_couplings(MeasuredRobot.of(setup), setup.all_samples.start) is not None
 
 
 def moved_since_zero(found: AssemblyModes, at: ClosedConfiguration, joint: Joint) -> float:
@@ -472,7 +471,7 @@ def test_all_ways_list_the_same(name: str):
     sets = [*dict.fromkeys([None, *legs(robot).minimal[:2]]), "motors"]
     for observe in sets:
         setup = ObservedRobot.of(robot, None if observe == "motors" else observe)
-        measured = MeasuredRobot.of_motors(setup) if observe == "motors" else MeasuredRobot.of_directions(setup)
+        measured = MeasuredRobot.of(setup, observe == "motors")
         if measured.rank < setup.dof:
             continue
         goal = setup.all_samples.start

@@ -41,7 +41,7 @@ def check_agreement(listed: AssemblyModes) -> None:
     """What is searched for is in the complete list, but for closings on another branch (crossed parallelograms, turns
     of a platform that only translates)."""
     assert listed.found.complete
-    measured = (MeasuredRobot.of_motors if listed.kind == "real" else MeasuredRobot.of_directions)(listed.setup)
+    measured = MeasuredRobot.of(listed.setup, listed.kind == "real")
     found = search(listed.goal, measured.observation_model, list_leg_ends(listed.setup.decomposition))
     assert found.loose == 0
     for mode in found.modes:
@@ -90,7 +90,7 @@ def test_a_platform_that_is_a_point_has_modes_at_points():
     """However its body, of which only the point counts, is turned."""
     mechanism, real = robot_of("planar, a point", 6)
     listed = hrsynth.modes(mechanism, real=real)
-    measured = (MeasuredRobot.of_motors if real else MeasuredRobot.of_directions)(listed.setup)
+    measured = MeasuredRobot.of(listed.setup, real)
     bodies = list_leg_ends(listed.setup.decomposition)
     found = search(listed.goal, measured.observation_model, bodies)
     assert listed.found.complete

@@ -297,7 +297,7 @@ def test_encoders_of_legs_are_held_with_the_legs() -> None:
     other = modes("rrrrr_m1", camera="eye=base@0.3,0.1,0.5", sensor="point:dist_1@0.1,0,0")
     assert (other.found.complete, len(other.modes)) == (True, 2)
     found = search(
-        other.goal, MeasuredRobot.of_directions(other.setup).observation_model, list_leg_ends(other.setup.decomposition)
+        other.goal, MeasuredRobot.of(other.setup).observation_model, list_leg_ends(other.setup.decomposition)
     )
     assert len(found.modes) == 2
 

@@ -15,11 +15,10 @@ from analysis.singularity.found import found
 from analysis.singularity.test_figures import centre
 from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.analysis.singularity.locus import Locus, choose_plane_grid
+from hrsynth.analysis.singularity.locus import COARSE_GRID_SIDE_COUNT, LOCUS_SIDES, Locus, choose_plane_grid
 from hrsynth.analysis.singularity.locus import compute_locus as drawn
 from hrsynth.analysis.singularity.rank_curve import PlaneOfPoses
 from hrsynth.batch.pose_continuation import sweep, track_to_pose
-from hrsynth.budgets import COARSE_GRID_SIDE_COUNT, LOCUS_SIDES
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, NoReachablePose
 from hrsynth.geometry.vectors import normalise_vector
@@ -176,7 +175,7 @@ def test_where_the_smallest_value_passes_through_zero_the_expression_does(
     """The curve knows the relation alone: its crossings of edges are the expression's, and in nine of ten
     cells in which that changes its sign, or beside them, there is one."""
     setup = ObservedRobot.of(robot, legs)
-    measured = MeasuredRobot.of_motors(setup) if real else MeasuredRobot.of_directions(setup)
+    measured = MeasuredRobot.of(setup, real)
     located = drawn(setup, plane=plane, steps=STEPS)
     start, motion, observation_model = setup.all_samples.start, setup.motion, measured.observation_model
     configurations = sweep(start, setup.samples.observation_model, located.grid, motion, setup.placer)

@@ -97,7 +97,7 @@ def test_four_points_are_on_all_danger_cylinders() -> None:
 def test_a_platform_that_translates_has_a_condition_of_all_kinds(sensor: list[str], words: str) -> None:
     """Three vectors have rank two just there; each is named by what it is."""
     setup = ObservedRobot.of("delta", camera=EYE, sensor=sensor)
-    assert MeasuredRobot.of_directions(setup).condition.words == words
+    assert MeasuredRobot.of(setup).condition.words == words
 
 
 def test_points_on_one_line() -> None:

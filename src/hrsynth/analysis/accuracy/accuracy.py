@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
-from ...budgets import ERROR_FIELD_CELLS_MAX, ERROR_SWEEP_CELLS_MAX
 from ...errors import BadRequest
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
@@ -18,14 +17,21 @@ from ...records import DEG, FLAT, As, Shown, recorded
 from ...results import Result
 from ...tolerances import FIRST_ORDER_POSE_ERROR_MAX
 from ..analysis_declaration import analysis
-from ..observed import POSES, UNLIMITED, CameraLike, LegsLike, NoiseLike, ObservedRobot, RobotLike, Seed, SensorLike
+from ..observation_inputs import POSES, CameraLike, LegsLike, NoiseLike, Seed, SensorLike
+from ..observed import ObservedRobot, RobotLike
 from ..pose_requests import solve_configurations
+from ..setup_records import LIMITS_IGNORED
 from ..verdict import compute_verdict
 from .error_map import ErrorMap, Mapper
 from .measurement_bounds import IN_SIGHT, Cones, MeasurementBounds, find_invisible
 from .nonlinear_check import NonlinearCheck, sample_true_errors
 from .pose_errors import PoseErrors, compute_error_maxima
 from .swept import SweptErrors, require_file, sweep_to
+
+ERROR_FIELD_CELLS_MAX = 10_000_000
+"""Largest number of grid cells with errors in memory: 160 MB."""
+ERROR_SWEEP_CELLS_MAX = 10_000_000_000
+"""Largest number of grid cells with errors in a file: 160 GB and some hours."""
 
 LARGEST_ERROR_POSES_COUNT = 3
 """Poses of a grid, those of the largest errors, at which the linear law is checked by samples."""
@@ -116,7 +122,7 @@ class Accuracy(Result, shown_as="accuracy"):
         "by unit (px, m, rad), of observations that are not directions",
     )
     exact = Shown(list[str], lambda self: self.bounds.exact(self.setup.observed), "observations without errors")
-    limits_ignored = Shown(list[str], lambda self: self.setup.limits_ignored, UNLIMITED)
+    limits_ignored = LIMITS_IGNORED
 
 
 @analysis(
@@ -125,8 +131,6 @@ class Accuracy(Result, shown_as="accuracy"):
         "delta --cone 0.1deg --at x=0.1",
         "delta --cone 0.1deg --plane z=-0.6 -o map.png",
     ),
-    cones="cone",
-    samples="nonlinear",
 )
 def accuracy(
     robot: RobotLike,
@@ -231,7 +235,7 @@ def accuracy(
             )
     held = None if plane is None else convert_to_pose(plane)
     cells = None if grid is None else Grid.parse(grid, ERROR_FIELD_CELLS_MAX if into is None else ERROR_SWEEP_CELLS_MAX)
-    setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed).telling(wanted)
+    setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed).printing_like(wanted)
     blur = MeasurementBounds.of(cone, noise, setup.observed)
     require_full_observation(setup)
     mapper = Mapper(setup, blur)
@@ -263,9 +267,7 @@ def compute_errors_at(setup: ObservedRobot, blur: MeasurementBounds, at: ClosedC
     motion, observation_model = setup.motion, setup.samples.observation_model
     pose, lost = motion.pose(at.pose(motion.link)), find_invisible(at, observation_model)
     if lost is not None:
-        raise BadRequest(
-            f"{setup.robot.name}: {lost.kind} {lost.leg} is not in front of its camera at {pose}", remedy=IN_SIGHT
-        )
+        raise BadRequest(f"{setup.robot.name}: {lost.text} is not in front of its camera at {pose}", remedy=IN_SIGHT)
     return compute_error_maxima(at, observation_model, blur, pose)
 
 

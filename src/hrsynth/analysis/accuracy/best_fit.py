@@ -15,20 +15,26 @@ from functools import cached_property
 
 import numpy as np
 
-from ...budgets import BEST_FIT_FIRST_STEP_FRACTION, BEST_FIT_SHORTEST_STEP, BEST_FIT_STEPS_MAX
 from ...errors import LoopClosureFailure
 from ...geometry.vectors import Array
 from ...kinematics.chart import TangentChart
 from ...kinematics.configuration import ClosedConfiguration, measure
 from ...kinematics.velocity_relation import ObservationModel, compute_relation
-from ...tolerances import (
-    FLAT_CURVATURE_FRACTION,
-    HESSIAN_CHANGE_MAX_FRACTION,
-    HESSIAN_DIFFERENCE_STEP_MAX,
-    HIDDEN_ROBOT_RESIDUAL_TOL,
-    PSEUDOINVERSE_CUTOFF_FRACTION,
-)
+from ...tolerances import HIDDEN_ROBOT_RESIDUAL_TOL, PSEUDOINVERSE_CUTOFF_FRACTION
 from ..singularity_indices import compute_interaction_matrix
+
+HESSIAN_DIFFERENCE_STEP_MAX = 1e-4
+"""Step of the differences of a best fit's Hessian."""
+HESSIAN_CHANGE_MAX_FRACTION = 0.5
+"""Largest relative change of a best fit's Hessian over a step; below 1 it stays definite."""
+FLAT_CURVATURE_FRACTION = 0.05
+"""Fraction of the initial curvature below which a best fit that cannot be continued is flat."""
+BEST_FIT_FIRST_STEP_FRACTION = 0.25
+"""First step along a best-fit curve, as a fraction of the direction error."""
+BEST_FIT_SHORTEST_STEP = 2.0**-22
+"""Smallest step along a best-fit curve, as a fraction of the error."""
+BEST_FIT_STEPS_MAX = 200
+"""Largest number of steps on one best-fit curve."""
 
 FIT, ENDS, NOT_FOUND = "fit", "ends", "not found"
 BEST_FIT_CORRECTIONS_MAX = 8

@@ -13,21 +13,25 @@ from numpy.typing import NDArray
 from ...batch.engine import Batch, Evaluation
 from ...batch.grids import list_grid_poses
 from ...batch.pose_continuation import explain_grid_dependence, sweep, track_to_pose
-from ...budgets import GRID_CELLS_MAX, NUMBA_SINGLE_BATCH_POSES_MIN
 from ...errors import BadRequest, Disagreement, HrsynthError, NoReachablePose
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.velocity_relation import ObservationModel
-from ...mechanism.pose import Grid, Pose
+from ...mechanism.pose import GRID_CELLS_MAX, Grid, Pose
 from ...progress import report
 from ...records import DEG, FLAT, MM, As, Recorded, Table
 from ...results import Value
-from ...tolerances import CHECKED_ERROR_MAX_FRACTION, RELATION_ANGLE_TOL
+from ...tolerances import RELATION_ANGLE_TOL
 from ..observed import ObservedRobot
 from ..singularity.locus import choose_plane_grid
 from ..singularity.rank_curve import PlaneOfPoses
 from .measurement_bounds import MeasurementBounds, find_invisible
 from .pose_errors import bound_pose_errors, compute_rates_and_twists
+
+CHECKED_ERROR_MAX_FRACTION = 100.0
+"""Multiple of the median error of a field up to which a pose is checked with longer numbers."""
+NUMBA_SINGLE_BATCH_POSES_MIN = 500_000
+"""Poses of a single batch from which compiled kernels are faster."""
 
 Flags = NDArray[np.bool_]
 ERROR_MAP_CHUNK_COUNT = 25_000

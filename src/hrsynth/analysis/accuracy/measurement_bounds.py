@@ -23,7 +23,10 @@ from ...mechanism.noise import Noise, compute_noise_rates
 from ...mechanism.observations.direction import SeenAxis
 from ...options import parse_plain_number
 from ...results import Value
-from ...tolerances import CONE_HALF_ANGLE_MIN_RAD, VISIBLE_SINE_MIN
+from ...tolerances import VISIBLE_SINE_MIN
+
+CONE_HALF_ANGLE_MIN_RAD = 1e-15
+"""Half-angle (rad) of a cone below which directions are equal as numbers."""
 
 ANGLES = "0.1deg, 0.002 (radians)"
 EXAMPLE = f"{ANGLES}, or one for each leg such as 1=0.1deg,2=0.2deg"
@@ -136,8 +139,8 @@ class MeasurementBounds(Value):
             raise BadRequest("--cone: applies to directions only", remedy="Use --noise.")
         if others and amounts is None:
             raise BadRequest(
-                f"--cone {cone}: applies to directions only, not to {others[0].kind} {others[0].leg}",
-                remedy="Add --noise, such as 0.3px or 1mm.",
+                f"--cone bounds directions only; {others[0].text} has no bound",
+                remedy="Add --noise in its unit, such as 0.3px or 1mm.",
             )
         if amounts is not None:
             amounts.amounts_for(others if cone is not None else observed)

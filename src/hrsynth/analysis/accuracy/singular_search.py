@@ -7,10 +7,19 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ...budgets import LINE_VALLEYS_MAX, PLANE_VALLEYS_MAX, VALLEY_NARROWING_FRACTION
 from ...geometry.vectors import Array
-from ...tolerances import VALLEY_DEPTH_FRACTION, VALLEY_ZERO_FRACTION
 from .error_map import ErrorMap
+
+VALLEY_DEPTH_FRACTION = 0.5
+"""Fraction of the median below which a valley of the smallest singular value is searched."""
+VALLEY_ZERO_FRACTION = 1e-5
+"""Part of the median at which the smallest singular value in a valley counts as zero."""
+VALLEY_NARROWING_FRACTION = 0.5
+"""Fraction of its reach that the search in a valley keeps per step."""
+LINE_VALLEYS_MAX = 600
+"""Largest number of valleys searched along lines."""
+PLANE_VALLEYS_MAX = 12
+"""Largest number of valleys searched in the plane."""
 
 SINGULAR_SEARCH_ROUNDS_COUNT = 28
 """Times the search is narrowed."""

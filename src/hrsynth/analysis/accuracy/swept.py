@@ -16,7 +16,6 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...budgets import ERROR_SWEEP_SAMPLES_COUNT, SWEEP_PART
 from ...description.files import add_checksum, convert_to_path, open_kept, require_alone, require_writable, unseal_line
 from ...errors import BadRequest, BuildInterruption, NoReachablePose
 from ...geometry.vectors import Array
@@ -28,6 +27,11 @@ from ...tolerances import FIRST_ORDER_POSE_ERROR_MAX
 from ...version import __version__
 from .error_map import ERROR_MAP_CHECKED_POSES_COUNT, ErrorField, Mapper, SpotChecks
 from .ranges import ErrorRange, Tally
+
+SWEEP_PART = 1 << 16
+"""Poses of a sweep evaluated at a time."""
+ERROR_SWEEP_SAMPLES_COUNT = 10_000
+"""Random poses of a sweep among which those are chosen that are compared with Pinocchio."""
 
 ENDING, PART, JOURNAL = ".npy", ".part", ".journal"
 ROW = np.dtype([("position", "<f8"), ("orientation", "<f8")])

@@ -13,7 +13,6 @@ from functools import cached_property
 from itertools import combinations, pairwise
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
-from ...budgets import ASPECTS_INTERVALS_MAX
 from ...errors import PoseReachFailure
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism.pose import ModeNumber, PoseLike
@@ -24,15 +23,17 @@ from ...results import Result, Value
 from ...tolerances import HIDDEN_ROBOT_RESIDUAL_TOL
 from ..analysis_declaration import analysis
 from ..modes.modes import AssemblyModes, at_mode, modes
-from ..observed import CameraLike, LegsLike, RobotLike, Seed, SensorLike
+from ..observation_inputs import CameraLike, LegsLike, Seed, SensorLike
+from ..observed import RobotLike
 from .path import PATH_INTERVALS_MAX, PathAnswer, PathPlanner
-from .singularity_slice import SingularitySlice, compute_singularity_slice
-from .three_cranks import CrankPlace, recognise_three_cranks
 from .vector_expressions import NoLegForm
 from .verdicts import SAME, SEPARATED, UNDECIDED
 
 if TYPE_CHECKING:
     import networkx as nx
+
+ASPECTS_INTERVALS_MAX = 60_000
+"""Largest number of intervals for all paths of the command aspects."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -127,18 +128,6 @@ class AspectTable(Result, shown_as="aspects"):
         few, many = self.count
         return str(few) if few == many else f"{few} to {many}"
 
-    @cached_property
-    def section(self) -> tuple[SingularitySlice, dict[int, CrankPlace]] | str:
-        """Slice of poses with the direction of the first observed leg fixed, and the modes on it, by number; or the
-        reason why there is none."""
-        modes_at = {k: at for k, at in enumerate(self.places, 1) if at is not None}
-        found = recognise_three_cranks(self.aspects, list(modes_at.values())) if modes_at else "there is no mode"
-        if isinstance(found, str):
-            return found
-        robot, places = found
-        held = places[0].rods[0] / abs(places[0].rods[0])
-        return compute_singularity_slice(robot, complex(held)), dict(zip(modes_at, places, strict=True))
-
     @property
     def changes(self) -> tuple[ModePair, ...]:
         """Pairs that show that the hidden robot is cuspidal: two modes, each proved to lie within the tube for which
@@ -194,7 +183,7 @@ def aspects(
     seed
         Seed of the random samples and of the road maps.
     budget
-        Largest number of intervals for one path; ``budgets.ASPECTS_INTERVALS_MAX`` for all of them.
+        Largest number of intervals for one path; ``ASPECTS_INTERVALS_MAX`` for all of them.
 
     Returns
     -------

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...budgets import FINEST_INTERVAL, PATH_FIRST_INTERVALS_COUNT
 from ...constraints.condition import NamedCondition, compute_leg_rows
 from ...geometry.balls import (
     Field,
@@ -22,9 +21,15 @@ from ...geometry.balls import (
     make_ball_jets,
 )
 from ...geometry.vectors import Array, cross, dot, triple
+from ...solving.exhaust import SETTLED, Boxes, Exhaustion
 from .leg_forms import LegForms
 from .path_segments import StraightSegment, WorkingModeChange
 from .vector_expressions import collect_subchains
+
+PATH_FIRST_INTERVALS_COUNT = 4
+"""Initial number of intervals of a path that is to be proved free of singularities."""
+FINEST_INTERVAL = 2.0**-16
+"""Smallest interval (fraction of its path) of such a proof."""
 
 PathSegment = StraightSegment | WorkingModeChange
 Leading = tuple[int, Field] | None
@@ -129,25 +134,26 @@ def prove(enclosure: ConditionEnclosure, way: PathSegment, budget: int) -> Proof
 
     Stops as soon as a midpoint is out of reach or on the other side, or an interval is too short.
     """
-    ends = np.linspace(0, 1, PATH_FIRST_INTERVALS_COUNT + 1)
-    low, high = ends[:-1], ends[1:]
     side, margin, boxes = 0.0, np.inf, 0
-    while len(low):
-        middle = (low + high) / 2
-        reached, values = enclosure.at(*way.at(middle))
+
+    def judge(middle: Array, half: Array) -> Boxes:
+        nonlocal side, margin, boxes
+        at, room = middle[:, 0], half[:, 0]
+        reached, values = enclosure.at(*way.at(at))
         sides = np.sign(values)
         side = side or float(sides[0])
-        if not reached.all() or np.any(sides != side) or side == 0 or boxes + len(low) > budget:
-            return Proof(False, 0.0, boxes)
-        boxes += len(low)
-        bounds = enclosure.bounds(way, low, high)
-        done = bounds > 0
-        margin = min(margin, float(np.min(bounds[done], initial=np.inf)))
-        low, high, middle = low[~done], high[~done], middle[~done]
-        if len(low) and high[0] - low[0] < FINEST_INTERVAL:
-            return Proof(False, 0.0, boxes)
-        low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
-    return Proof(True, margin, boxes)
+        if not reached.all() or np.any(sides != side) or side == 0:
+            return middle, half, np.full(len(at), SETTLED - 1)
+        boxes += len(at)
+        bounds = enclosure.bounds(way, at - room, at + room)
+        margin = float(np.min(bounds[bounds > 0], initial=margin))
+        axis = np.where(bounds > 0, SETTLED, np.where(2 * room < FINEST_INTERVAL, SETTLED - 1, 0))
+        return middle, half, axis
+
+    middle = (np.arange(PATH_FIRST_INTERVALS_COUNT)[:, None] + 0.5) / PATH_FIRST_INTERVALS_COUNT
+    half = np.full_like(middle, 0.5 / PATH_FIRST_INTERVALS_COUNT)
+    proved = Exhaustion(judge, (middle, half), budget).run().is_settled
+    return Proof(proved, margin if proved else 0.0, boxes)
 
 
 def enclose_value(enclosure: ConditionEnclosure, p: Array, R: Array) -> tuple[bool, float]:

@@ -27,7 +27,8 @@ from ...tolerances import CLOSURE_SOLVER_TOL, PRINTED_POSE_TOL, RANK_CUTOFF_FRAC
 from ..accuracy.measurement_bounds import find_invisible
 from ..analysis_declaration import analysis
 from ..measured import MeasuredRobot
-from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SensorLike, StartPose
+from ..observation_inputs import CameraLike, LegsLike, Seed, SensorLike, StartPose
+from ..observed import ObservedRobot, RobotLike
 from ..pose_requests import solve_configurations
 from ..singularity.condition_check import compute_smallest_value, compute_smallest_values
 from .condition_enclosure import ConditionEnclosure, PathSegment, enclose_value, has_sign_change, is_beyond
@@ -228,7 +229,7 @@ class PathPlanner(Value):
     ) -> PathPlanner:
         """Return the planner of a robot, its condition from random samples of its motion."""
         setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed)
-        seen = MeasuredRobot.of_directions(setup)
+        seen = MeasuredRobot.of(setup)
         return cls(
             setup, setup.motion, seen.pattern, seen.condition, seen.verdict.never if seen.verdict.unobserved else ""
         )
@@ -334,9 +335,7 @@ class PathPlanner(Value):
         )
         worst = int(np.argmin(np.abs(values)))
         changes = int(np.sum(values[1:] * values[:-1] < 0)) if self.condition.signed else None
-        lost = next(
-            (f"{o.kind} {o.leg}" for at in way if (o := find_invisible(at, observation_model)) is not None), None
-        )
+        lost = next((o.text for at in way if (o := find_invisible(at, observation_model)) is not None), None)
         return SampledRoute(
             len(way),
             float(abs(values[worst])),
@@ -577,7 +576,7 @@ def plan_between_poses(
     budget: int = PATH_INTERVALS_MAX,
 ) -> PathAnswer:
     """Search for a path between the configurations at a start and a goal, see :meth:`PathPlanner.join`."""
-    aspects = PathPlanner.of(setup.telling(wanted), seed=seed)
+    aspects = PathPlanner.of(setup.printing_like(wanted), seed=seed)
     report("poses")
     first, last = solve_configurations(aspects.setup, wanted, by_modes=True)
     return aspects.join(first, last, seed=seed, budget=budget, any_mode=any_mode)

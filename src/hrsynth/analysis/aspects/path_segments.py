@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail
+from ...closed_forms.legs import ClosedFormLeg
 from ...closed_forms.platform_points import PlatformPoint
 from ...geometry.balls import Field, widen
 from ...geometry.so3 import convert_rotations_to_vectors, convert_vectors_to_rotations
@@ -193,18 +193,18 @@ def build_mode_change(
 
     Where the platform's point moves in a plane only, the crank and the rod rotate in that plane.
     """
-    if not isinstance(limb, OnCrank | OnRail) or not (limb.tip.follows and coordinates.turning):
+    if not (limb.rod and limb.tip.follows and coordinates.turning):
         return None
     tip = limb.tip.value(place[0][None], place[1][None])
     ends = [limb.solve(tip, sign * limb.mode)[1][0] for sign in (1.0, -1.0)]
     rods = [tip[0] - end for end in ends]
-    axis = limb.axis if isinstance(limb, OnCrank) else np.cross(*rods)
+    axis = np.asarray(limb.axis if limb.radius else np.cross(*rods))
     axis = axis / max(float(np.linalg.norm(axis)), HIDDEN_ROBOT_RESIDUAL_TOL)
     shifts = coordinates.motion.translations
     if shifts.shape[1] < 2 or (shifts.shape[1] == 2 and np.linalg.norm(axis @ shifts) > HIDDEN_ROBOT_RESIDUAL_TOL):
         return None
     rod = TurningVector.between(rods[0], rods[1], axis)
-    if isinstance(limb, OnRail):
+    if not limb.radius:
         return WorkingModeChange(place, number, limb.label, limb.tip, rod, (ends[0], ends[1]), np.zeros(3))
     spokes = [end - limb.centre for end in ends]
     crank = TurningVector.between(spokes[0], spokes[1], axis)

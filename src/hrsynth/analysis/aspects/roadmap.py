@@ -15,11 +15,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...budgets import PATH_FIRST_INTERVALS_COUNT, ROADMAP_REGION_FRACTION
 from ...geometry.so3 import convert_rotations_to_vectors, convert_vectors_to_rotations
 from ...geometry.vectors import Array
 from ...progress import report
-from .condition_enclosure import ConditionEnclosure, PathSegment, Proof, prove
+from .condition_enclosure import PATH_FIRST_INTERVALS_COUNT, ConditionEnclosure, PathSegment, Proof, prove
 from .path_segments import (
     PathCoordinates,
     Place,
@@ -31,6 +30,9 @@ from .path_segments import (
 
 if TYPE_CHECKING:
     import networkx as nx
+
+ROADMAP_REGION_FRACTION = 1.5
+"""Enlargement of the region of the known poses from which a roadmap is sampled."""
 
 
 @dataclass(frozen=True, eq=False)

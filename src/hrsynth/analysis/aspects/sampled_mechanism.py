@@ -3,13 +3,16 @@ form."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import cast
 
 import numpy as np
 
-from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
+from ...closed_forms.leg_reading import LegReader, LegTip
+from ...closed_forms.legs import ClosedFormLeg
 from ...closed_forms.platform_points import ORIGIN, PlatformPoint, platform_point
 from ...constraints.named_vectors import (
     BodyPoint,
@@ -40,48 +43,6 @@ from .vector_expressions import (
 )
 
 
-def fit_rail_rod(leg: str, tip: PlatformPoint, tips: Array, ends: Array, axis: Array) -> OnRail | None:
-    """Return the rod from points (n, 3) that move along a base direction to tips (n, 3), or None if its length
-    changes."""
-    rods = np.linalg.norm(tips - ends, axis=1)
-    paths = ends - ends[0]
-    off = paths - (paths @ axis)[:, None] * axis
-    if np.ptp(rods) > HIDDEN_ROBOT_RESIDUAL_TOL or np.max(np.abs(off)) > HIDDEN_ROBOT_RESIDUAL_TOL:
-        return None
-    return OnRail(leg, tip, centre=ends[0], axis=axis, rod=float(rods[0]))
-
-
-def fit_crank_rod(leg: str, tip: PlatformPoint, tips: Array, ends: Array, on: Array, axis: Array) -> OnCrank | None:
-    """Return the rod from points (n, 3) that rotate about a base axis to tips (n, 3), or None if its length changes."""
-    rods = np.linalg.norm(tips - ends, axis=1)
-    spokes = ends - on
-    height = spokes @ axis
-    spokes = spokes - height[:, None] * axis
-    cranks = np.linalg.norm(spokes, axis=1)
-    if (
-        max(np.ptp(rods), np.ptp(cranks), np.ptp(height)) > HIDDEN_ROBOT_RESIDUAL_TOL
-        or cranks[0] < HIDDEN_ROBOT_RESIDUAL_TOL
-    ):
-        return None
-    return OnCrank(leg, tip, centre=on + height[0] * axis, axis=axis, radius=float(cranks[0]), rod=float(rods[0]))
-
-
-def fit_sliding_rod(
-    leg: str, tip: PlatformPoint, tips: Array, centre: Array, axis: Array | None, directions: Array
-) -> SlidingRod | None:
-    """Return the rod with directions (n, 3) that slides through tips (n, 3), or None if it does not."""
-    D = tips - centre
-    if np.max(np.linalg.norm(np.cross(D, directions), axis=1)) < HIDDEN_ROBOT_RESIDUAL_TOL:
-        return SlidingRod(leg, tip, centre=centre)
-    if axis is None or np.max(np.abs(directions @ axis)) > HIDDEN_ROBOT_RESIDUAL_TOL:
-        return None
-    aside = np.cross(axis, directions)
-    offsets = np.einsum("ij,ij->i", D, aside)
-    if np.ptp(offsets) > HIDDEN_ROBOT_RESIDUAL_TOL:
-        return None
-    return SlidingRod(leg, tip, centre=centre, axis=axis, aside=float(offsets[0]))
-
-
 @dataclass(frozen=True, eq=False)
 class SampledMechanism:
     """Mechanism at sampled configurations: positions of points and directions of it."""
@@ -91,12 +52,22 @@ class SampledMechanism:
     configurations: Sequence[ClosedConfiguration]
     derived: JointRules
 
+    @cached_property
+    def frames(self) -> dict[str, Array]:
+        """The poses (n, 4, 4) of all links, characteristic lengths."""
+        return collect_poses(self.configurations, tuple(self.mechanism.links))
+
+    @cached_property
+    def places(self) -> tuple[Array, Array]:
+        """The poses (n, 3), (n, 3, 3) of the platform."""
+        return self.coordinates.of(self.configurations)
+
     def values(self, feature: NamedVector) -> Array:
-        return feature.value(collect_poses(self.configurations, feature.links))
+        return feature.value(self.frames)
 
     def rule(self, feature: NamedVector) -> PlatformPoint | None:
         """Return how a vector follows from the pose: read from the joints if samples agree, else fitted."""
-        values, places = self.values(feature), self.coordinates.of(self.configurations)
+        values, places = self.values(feature), self.places
         found = self.derived.rule(feature)
         if found is not None and np.max(np.abs(found.value(*places) - values)) < HIDDEN_ROBOT_RESIDUAL_TOL:
             return found
@@ -105,71 +76,46 @@ class SampledMechanism:
     def subchains(self, leg: Leg) -> Iterator[tuple[ClosedFormLeg, NamedVector]]:
         """Yield the rods of a leg with the vectors that they carry, each equation once; else its sliding rod."""
         seen: list[tuple[Array, Array]] = []
+        reader = LegReader(self.mechanism, leg, self.frames, *self.places, self.coordinates.length)
         for tip, spot in self.tips(leg):
-            for limb, end in self.rods(leg, tip, spot):
-                ends, tips = self.values(end), self.values(spot)
+            tips = self.values(spot)
+            for limb, joint, ends in reader.rods(tip):
                 if all(
                     max(np.ptp(ends - a, axis=0).max(), np.max(np.abs(ends - a - tips + b))) > HIDDEN_ROBOT_RESIDUAL_TOL
                     for a, b in seen
                 ):
                     seen.append((ends, tips))
-                    yield limb, end
-        if not seen:
-            yield from self.slides(leg)
-
-    def tips(self, leg: Leg) -> Iterator[tuple[PlatformPoint, BodyPoint]]:
-        """Yield the joint centres of a leg, and the point that gives the position, that follow from the pose alone."""
-        for joint in self.joints(leg):
-            if self.mechanism.base not in joint.links:
-                spot = self.centre(joint, joint.successor)
-                rule = self.rule(spot)
-                if rule is not None and (rule.follows or np.any(rule.turned)):
-                    yield rule, spot
-        if not self.coordinates.turning:
-            motion = self.coordinates.motion
-            yield (ORIGIN, BodyPoint("P", "the point", motion.link, motion.point / self.coordinates.length))
-
-    def rods(self, leg: Leg, tip: PlatformPoint, spot: BodyPoint) -> Iterator[tuple[ClosedFormLeg, NamedVector]]:
-        joints, tips = self.joints(leg), self.values(spot)
-        for foot in joints:
-            if self.mechanism.base not in foot.links or foot.type not in (JointType.REVOLUTE, JointType.PRISMATIC):
-                continue
-            first = foot.predecessor if foot.successor == self.mechanism.base else foot.successor
-            axis = self.values(make_axis(self.mechanism, foot, "a"))[0]
-            on = self.values(self.centre(foot, self.mechanism.base))[0]
-            for joint in joints:
-                if joint is foot or first not in joint.links:
-                    continue
-                end = self.centre(joint, first)
-                ends = self.values(end)
-                if foot.type is JointType.REVOLUTE:
-                    found: ClosedFormLeg | None = fit_crank_rod(leg.label, tip, tips, ends, on, axis)
-                else:
-                    found = fit_rail_rod(leg.label, tip, tips, ends, axis)
-                if found is not None:
+                    end = self.centre(joint, limb.crank)
                     # one link has both ends of the rod, so that its length is constant
                     rod = set(self.derived.holders(spot)) & set(self.derived.holders(end))
-                    yield replace(found, fitted=tip.fitted or not rod), end
+                    yield replace(limb, fitted=limb.tip.fitted or not rod), end
+        if not seen:
+            yield from itertools.islice(self.slides(reader), 1)
 
-    def slides(self, leg: Leg) -> Iterator[tuple[ClosedFormLeg, NamedVector]]:
-        joints = self.joints(leg)
-        feet = [joint for joint in joints if self.mechanism.base in joint.links]
-        for tip, spot in self.tips(leg):
-            tips = self.values(spot)
-            for foot in feet:
-                centre = self.values(self.centre(foot, self.mechanism.base))[0]
-                turns = foot.type is JointType.REVOLUTE
-                axis = self.values(make_axis(self.mechanism, foot, "a"))[0] if turns else None
-                for slide in joints:
-                    if slide.type is JointType.PRISMATIC and slide is not foot:
-                        direction = make_axis(self.mechanism, slide, "p")
-                        found = fit_sliding_rod(leg.label, tip, tips, centre, axis, self.values(direction))
-                        if found is not None:
-                            fitted = tip.fitted or not self.is_rod_form_of_slider(foot, slide, spot, found)
-                            yield replace(found, fitted=fitted), direction
-                            return
+    def tips(self, leg: Leg) -> Iterator[tuple[LegTip, BodyPoint]]:
+        """Yield the joint centres of a leg, and the point that gives the position, that follow from the pose alone."""
+        spots = [self.centre(j, j.successor) for j in self.joints(leg) if self.mechanism.base not in j.links]
+        rules = [(self.rule(spot), spot) for spot in spots]
+        if not self.coordinates.turning:
+            motion = self.coordinates.motion
+            spot = BodyPoint("P", "the point", motion.link, motion.point / self.coordinates.length)
+            rules.append((ORIGIN, spot))
+        for rule, spot in rules:
+            if rule is not None and (rule.follows or np.any(rule.turned)):
+                yield LegTip(np.zeros(3), lambda _, rule=rule: rule), spot  # type: ignore[misc]
 
-    def is_rod_form_of_slider(self, foot: Joint, slide: Joint, tip: BodyPoint, limb: SlidingRod) -> bool:
+    def slides(self, reader: LegReader) -> Iterator[tuple[ClosedFormLeg, NamedVector]]:
+        """Yield the rods that slide along a P of a leg."""
+        for tip, spot in self.tips(reader.leg):
+            for slide in reader.joints:
+                if slide.type is JointType.PRISMATIC:
+                    direction = make_axis(self.mechanism, slide, "p")
+                    for limb, foot in reader.sliding_rods(tip, self.values(direction)):
+                        if foot is not slide:
+                            fitted = limb.tip.fitted or not self.is_rod_form_of_slider(foot, slide, spot, limb)
+                            yield replace(limb, fitted=fitted), direction
+
+    def is_rod_form_of_slider(self, foot: Joint, slide: Joint, tip: BodyPoint, limb: ClosedFormLeg) -> bool:
         """Return True if a P joint between a link with the proximal centre and one with the tip makes the form: its
         axis passes through both, or stays normal to the proximal axis."""
         centre = self.centre(foot, self.mechanism.base)

@@ -10,7 +10,6 @@ from itertools import combinations, islice, product
 
 import numpy as np
 
-from ...budgets import LEG_SOLUTION_CHOICES_MAX, MODES_TIME_LIMIT_S
 from ...errors import TooLarge
 from ...geometry.vectors import Array, build_plane_axes, build_pose, compare_poses, invert_pose, transform
 from ...kinematics.configuration import ClosedConfiguration
@@ -22,6 +21,11 @@ from .rigid import Planar, Spatial
 from .solve import SystemMode, SystemModes, solve
 from .tips import TipLoci
 from .translating import ArticulatedPlatform, TranslatingPlatform
+
+LEG_SOLUTION_CHOICES_MAX = 256
+"""Largest number of combinations of leg solutions; beyond it the list of modes is not complete."""
+MODES_TIME_LIMIT_S = 120.0
+"""Default time limit of a list of modes (s of one core), compared with an estimate that no machine changes."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

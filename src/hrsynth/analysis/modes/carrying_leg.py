@@ -156,7 +156,7 @@ def _carrier(
     own = [each for each in rest.observations if each.leg == leg.label]
     held = [each.joint for each in own if isinstance(each, Encoder)]
     if decomposition.is_free_body(leg):
-        raise UnsupportedLocus(mechanism.name, "nothing carries its platform: it is a free body")
+        raise UnsupportedLocus(mechanism.name, "no leg carries the platform, which is a free body")
     path, at, found, links = decomposition.path(leg), mechanism.base, list[Turn](), {mechanism.base: 0}
     if set(leg.joints) - {name for edge in path for name in edge.joints}:
         raise UnsupportedLocus(mechanism.name, f"leg {leg.label} has loops")

@@ -4,22 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from ...budgets import LARGEST_LOOPS, PLANAR_STARTS
 from ...constraints.pattern import list_leg_ends
 from ...errors import ExternalSolverFailure, UnsupportedLocus
 from ...geometry.vectors import Array, cross, freeze_array, hat
 from ...kinematics.configuration import ClosedConfiguration
+from ...solving.krawczyk import Polynomial, enclose_zero
+from ...solving.newton import approach_zeros, collect_zeros
+from ...tolerances import LARGEST_LOOPS, PLANAR_STARTS
 from ..measured import MeasuredRobot
 from .branches import Model
 from .carrying_leg import carried_platform
 from .carrying_leg_system import CarriedCondition, CarriedEquation, CarriedPlatform
 from .conditions import PoseCondition
 from .joint_forms import closings_bound, eigenvalues
-from .polynomials import Polynomial, krawczyk
 from .pose_boxes import (
     COMPLEX_ZERO_IMAGINARY_MIN,
     POSE_BOX_BITS_COUNT,
@@ -87,37 +89,24 @@ class _FixedUnknown:
         return [0 * v + (j == self.k) for j, v in enumerate(x)]
 
 
+def measure_joint_distances(slides: Array, x: Array, y: Array) -> Array:
+    """Distances of joint coordinates (…, n), angles up to whole turns."""
+    return np.asarray(np.abs(np.where(slides, x - y, np.exp(1j * (x - y)) - 1.0)).max(axis=-1))
+
+
 def proposals(system: CarriedPlatform, most: int) -> Array:
     """Common zeros (k, n) that Newton's method finds from random complex starts, each with its conjugate."""
-    rng, n, found = np.random.default_rng(0), len(system.freedoms_), np.zeros((0, len(system.freedoms_)))
-    for _ in range(PLANAR_STARTS):
-        start = rng.uniform(-np.pi, np.pi, (64, n)) + 3j * rng.normal(size=(64, n))
-        found = polish_zeros(system, start, found)
-        if len(found) >= most:
-            break
-    return found
+    rng, n = np.random.default_rng(0), len(system.freedoms_)
+    starts = (rng.uniform(-np.pi, np.pi, (64, n)) + 3j * rng.normal(size=(64, n)) for _ in range(PLANAR_STARTS))
+    return polish_zeros(system, starts, most)
 
 
-def polish_zeros(system: CarriedPlatform, q: Array, known: Iterable[Array] = ()) -> Array:
-    """The common zeros (k, n) to which Newton's method leads, each with its conjugate, after those that are known."""
-    slides, found = np.array([each.slides for each in system.freedoms_]), list(known)
-    with np.errstate(all="ignore"):
-        for _ in range(100):
-            F, J = system.values(q, system.square)
-            good = np.all(np.isfinite(J), axis=(1, 2)) & np.all(np.isfinite(F), axis=1)
-            q, F, J = q[good], F[good], J[good]
-            try:
-                step = np.linalg.solve(J, F[:, :, None])[:, :, 0]
-            except np.linalg.LinAlgError:
-                step = (np.linalg.pinv(J) @ F[:, :, None])[:, :, 0]
-            q = q - step / np.maximum(1.0, 2.0 * np.abs(step).max(axis=1))[:, None]
-    for each in (y for x in q[np.abs(step).max(axis=1) < 1e-10] for y in (x, x.conj())):
-        turned = np.angle(np.exp(1j * each.real)) + 1j * each.imag
-        at = np.where(slides, each, turned)
-        apart = (np.abs(np.where(slides, at - other, np.exp(1j * (at - other)) - 1.0)).max() for other in found)
-        if not any(far < 1e-6 for far in apart):
-            found.append(at)
-    return np.array(found).reshape(-1, len(slides))
+def polish_zeros(system: CarriedPlatform, starts: Iterable[Array], enough: float = np.inf) -> Array:
+    """The common zeros (k, n) to which Newton's method leads, each with its conjugate, until there are enough."""
+    slides = np.array([each.slides for each in system.freedoms_])
+    ends = (approach_zeros(lambda q: system.values(q, system.square), q, steps=100, longest=0.5) for q in starts)
+    found = collect_zeros(ends, enough, measure=partial(measure_joint_distances, slides))
+    return np.where(slides, found, np.angle(np.exp(1j * found.real)) + 1j * found.imag)
 
 
 def solve_carried(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0) -> tuple[Model, SystemModes]:
@@ -161,7 +150,7 @@ def _far(system: CarriedPlatform, proposed: Array, known: Sequence[PoseBox]) -> 
                 continue
             with np.errstate(all="ignore"):
                 start = np.where(slides, q, np.tan(q / 2.0))
-            half = krawczyk(equations, [acb(v.real, v.imag) for v in start.tolist()])
+            half = enclose_zero(equations, [acb(v.real, v.imag) for v in start.tolist()])
             if half is None:
                 continue
             squares = [1 + t * t for t in half]
@@ -191,7 +180,7 @@ def _judge(system: CarriedPlatform) -> SystemModes:
     boxes = enclose_zeros(system, proposals(system, most)) if n <= RANDOM_START_JOINTS_MAX else []
     if len(boxes) < most and (counted := closings_bound(system, system.square)) is not None:
         most, why, bound = counted.most, "ranks modulo a prime of 62 bits", "rank"
-        proposed = polish_zeros(system, eigenvalues(system, system.square, counted))
+        proposed = polish_zeros(system, [eigenvalues(system, system.square, counted)])
         boxes = enclose_zeros(system, proposed)
         boxes += _far(system, proposed, boxes)
     at_goal = [box for box in boxes if box.real and box.has_pose(system.unknowns(system.home))]

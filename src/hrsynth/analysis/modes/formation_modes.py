@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...budgets import MODE_SEARCH_ITERATIONS_MAX, MODE_SEARCH_QUIET_STARTS_COUNT, MODE_SEARCH_STARTS_MAX
 from ...errors import UndefinedValue
 from ...geometry.ranks import compute_kernel_basis
 from ...geometry.vectors import Array, build_pose
@@ -28,6 +27,9 @@ from ...tolerances import (
     CLOSURE_RESIDUAL_TOL,
     CLOSURE_SOLVER_TOL,
     LOCUS_DISTANCE_TOL,
+    MODE_SEARCH_ITERATIONS_MAX,
+    MODE_SEARCH_QUIET_STARTS_COUNT,
+    MODE_SEARCH_STARTS_MAX,
     MOVED_AXIS_LEVER_MAX,
     NAMED_TWIST_TOL,
     NUMBER_ROUNDING,

@@ -11,23 +11,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import product
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ...budgets import HOMOTOPY_PATH_STEPS_MAX, HOMOTOPY_ROUNDS_MAX
-from ...geometry.vectors import Array
-from ...tolerances import (
-    ENDPOINT_DISTANCE_TOL,
-    SHARP_ENDPOINT_STEP_TOL,
-    SINGULAR_ENDPOINT_DISTANCE_TOL,
-    SINGULAR_ENDPOINT_VALUE_TOL,
-    SOLUTION_DISTANCE_MAX,
-)
+from ...geometry.vectors import Array, times
+from ...solving.newton import approach_zeros, solve_squares
+from ...tolerances import ENDPOINT_DISTANCE_TOL, SOLUTION_DISTANCE_MAX
 from .polynomials import Quadric
 from .study_coordinates import forms
+
+SHARP_ENDPOINT_STEP_TOL = 1e-9
+"""Newton step (unit vectors) at which a path endpoint is accurate."""
+SINGULAR_ENDPOINT_DISTANCE_TOL = 1e-4
+"""Distance (unit vectors) below which two singular endpoints are one."""
+SINGULAR_ENDPOINT_VALUE_TOL = 1e-5
+"""Smallest singular value of scaled quadrics below which an endpoint is singular; a tenth is the cutoff on the path."""
+HOMOTOPY_ROUNDS_MAX = 3
+"""Largest number of rounds of a homotopy, each on other paths."""
+HOMOTOPY_PATH_STEPS_MAX = 400
+"""Largest number of steps of a path."""
 
 FIRST_STEP, SHORTEST_STEP, LAST_STEP = 0.05, 1e-12, 1e-9
 """Part of the way that is gone first, at which a path is given up, and that may be left at its end."""
@@ -65,7 +71,7 @@ def section() -> Array:
 def _start() -> tuple[Array, Array]:
     """Section and its solutions (40, 8), unit vectors, computed once by monodromy."""
     x = np.load(Path(__file__).with_name("section.npy")).astype(complex)
-    return section(), _newton(section(), x, 2)[0]
+    return section(), _sharpen(section(), x)[0]
 
 
 def ends(
@@ -168,11 +174,11 @@ class _UnitEndpoints:
 
 def _sort_ends(wanted: Array, x: Array, known: Sequence[Array]) -> _UnitEndpoints:
     """Classify the endpoints (m, 8) of paths, with solutions that are ``known`` already."""
-    left, (x, steps) = x, _newton(wanted, x, POLISHES)
+    left, (x, sharp) = x, _sharpen(wanted, x)
     infinite = _distance(x) > SOLUTION_DISTANCE_MAX
-    sharp = ~infinite & (steps < SHARP_ENDPOINT_STEP_TOL)
+    sharp &= ~infinite
     poses = _conjugates([*known, *x[sharp]])
-    vague, misses, least = _gauss_newton(wanted, left[~infinite & ~sharp])
+    vague, misses, least = _sharpen_singular(wanted, left[~infinite & ~sharp])
     vague = vague[
         (misses < ENDPOINT_DISTANCE_TOL)
         & (least < SINGULAR_ENDPOINT_VALUE_TOL)
@@ -218,45 +224,41 @@ def _distance(x: Array) -> Array:
     return 2.0 * np.linalg.norm(g, axis=1) * np.linalg.norm(e, axis=1) / (np.abs((e * e).sum(axis=1)) + 1e-300)
 
 
-def _newton(quadrics: Array, x: Array, rounds: int) -> tuple[Array, Array]:
-    """Unit vectors (m, 8) after so many of Newton's steps, and how long the last ones were."""
-    steps = np.zeros(len(x))
-    for _ in range(rounds):
-        J = 2.0 * np.einsum("kij,nj->nki", quadrics, x)
-        step = _step(J, x, np.einsum("nki,ni->nk", J, x) / 2.0)
-        steps = np.linalg.norm(step, axis=1)
-        x = np.where(steps[:, None] < 1.0, _normalise(x + step), x)
-    return x, steps
+def _evaluate(quadrics: Array, x: Array, fixed: Array) -> tuple[Array, Array]:
+    """The quadrics and ``fixed`` · x − 1 at x (m, 8), and their derivatives."""
+    J = 2.0 * np.einsum("kij,nj->nki", quadrics, x)
+    F = np.einsum("nki,ni->nk", J, x) / 2.0
+    return np.column_stack([F, (fixed * x).sum(axis=1) - 1.0]), _border(J, fixed)
 
 
-def _gauss_newton(quadrics: Array, x: Array) -> tuple[Array, Array, Array]:
+def _sharpen(quadrics: Array, x: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Unit vectors (m, 8) after a few of Newton's steps, and which (m,) are solutions."""
+    ends = approach_zeros(
+        partial(_evaluate, quadrics), x, x.conj(), steps=POLISHES, longest=1.0, step_tol=SHARP_ENDPOINT_STEP_TOL / 2.0
+    )
+    return _normalise(ends.x), ends.converged
+
+
+def _sharpen_singular(quadrics: Array, x: Array) -> tuple[Array, Array, Array]:
     """Unit vectors (m, 8) after steps that leave out what is nearly singular, what is left of the quadrics there, and
     the smallest singular values."""
-    for _ in range(ROUNDS):
-        J = _border(2.0 * np.einsum("kij,nj->nki", quadrics, x), x)
-        F = np.einsum("nki,ni->nk", J, x) / 2.0
-        F[:, -1] = 0.0
-        step = np.linalg.pinv(J, rcond=SINGULAR_ENDPOINT_VALUE_TOL / 10.0) @ F[:, :, None]
-        x = _normalise(x - step[:, :, 0])
-    J = _border(2.0 * np.einsum("kij,nj->nki", quadrics, x), x)
-    misses: Array = np.abs(np.einsum("nki,ni->nk", J[:, :-1], x)).max(axis=1, initial=0.0)
-    return x, misses, np.linalg.svd(J, compute_uv=False)[:, -1].astype(float)
+
+    def solve(J: Array, F: Array) -> Array:
+        return times(np.linalg.pinv(J, rcond=SINGULAR_ENDPOINT_VALUE_TOL / 10.0), F)
+
+    x = _normalise(approach_zeros(partial(_evaluate, quadrics), x, x.conj(), steps=ROUNDS, solve=solve).x)
+    F, J = _evaluate(quadrics, x, x.conj())
+    return x, np.abs(F[:, :-1]).max(axis=1, initial=0.0), np.linalg.svd(J, compute_uv=False)[:, -1].astype(float)
 
 
 def _step(J: Array, x: Array, F: Array) -> Array:
-    """The solution of J d = −F, normal to x; not finite where there is none."""
-    right = np.concatenate([-F, np.zeros((len(x), 1))], axis=1)[:, :, None]
-    try:
-        return np.asarray(np.linalg.solve(_border(J, x), right)[:, :, 0])
-    except np.linalg.LinAlgError:  # NumPy does not report which one
-        if len(x) == 1:
-            return np.full(x.shape, np.inf, dtype=complex)
-        return np.concatenate([_step(J[k : k + 1], x[k : k + 1], F[k : k + 1]) for k in range(len(x))])
+    """The solution of J d = −F, normal to x."""
+    return solve_squares(_border(J, x.conj()), np.column_stack([-F, np.zeros(len(x))]))
 
 
-def _border(J: Array, x: Array) -> Array:
-    """J (m, n, n + 1) with the conjugate of x below."""
-    return np.concatenate([J, x.conj()[:, None]], axis=1)
+def _border(J: Array, last: Array) -> Array:
+    """J (m, n, n + 1) with a last row (m, n + 1)."""
+    return np.concatenate([J, last[:, None]], axis=1)
 
 
 def _normalise(x: Array) -> Array:

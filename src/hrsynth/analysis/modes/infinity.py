@@ -14,8 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...geometry.vectors import Array
+from ...solving.krawczyk import Polynomial, enclose_zero
+from ...solving.newton import approach_zeros
 from ...tolerances import ENDPOINT_DISTANCE_TOL, SOLUTION_DISTANCE_MAX
-from .polynomials import Polynomial, Quadric, krawczyk
+from .polynomials import Quadric
 from .quadrics import PoseSystem, Within
 
 ENDPOINT_NEWTON_STEPS_COUNT = 8
@@ -100,11 +102,11 @@ def _enclose_infinity(part: PoseSystem, balls: Within, far: Array, mark: Array) 
     thick = _equations(part.equations(balls), own.A, [np.array([acb(v) for v in row], dtype=object) for row in rows])
     boxes: list[list[Any]] = []
     known: list[Array] = []
-    for z in (_polish(rounded, start) for start in _starts(np.vstack([far, far.conj()]), mark, study)):
+    for z in _polish(rounded, _starts(np.vstack([far, far.conj()]), mark, study)):
         if not np.all(np.isfinite(z)) or any(np.abs(z - other).max() < ENDPOINT_DISTANCE_TOL for other in known):
             continue
         known.append(z)
-        box = krawczyk(thick, [acb(v) for v in z.tolist()])
+        box = enclose_zero(thick, [acb(v) for v in z.tolist()])
         if box is None or box[8].contains(0):  # κ = 0 at double points
             continue
         # |e|² is at least 1/|mark|² = 1/4, and |e·e| = |e·g'|² / |κ|
@@ -130,17 +132,16 @@ def _starts(far: Array, mark: Array, study: Array) -> Array:
     return np.column_stack([np.hstack([e, moved]) @ np.linalg.inv(study).T, kappa])
 
 
-def _polish(equations: Sequence[Polynomial], z: Array) -> Array:
-    """z after Newton's steps; not finite where it cannot go on."""
-    for _ in range(ENDPOINT_NEWTON_STEPS_COUNT):
-        J: Array = np.array([equation.slopes(list(z)) for equation in equations], dtype=complex)
-        F: Array = np.array([equation.value(list(z)) for equation in equations], dtype=complex)
-        scale = np.abs(J).max(axis=1)
-        try:
-            z = z - np.linalg.solve(J / scale[:, None], F / scale)
-        except np.linalg.LinAlgError:
-            return np.full(len(z), np.nan)
-    return z
+def _polish(equations: Sequence[Polynomial], starts: Array) -> Array:
+    """Places (m, 9) after Newton's steps."""
+
+    def evaluate(z: Array) -> tuple[Array, Array]:
+        J: Array = np.array([[equation.slopes(list(each)) for equation in equations] for each in z], dtype=complex)
+        F: Array = np.array([[equation.value(list(each)) for equation in equations] for each in z], dtype=complex)
+        scale = np.abs(J).max(axis=2)
+        return F / scale, J / scale[..., None]
+
+    return approach_zeros(evaluate, starts, steps=ENDPOINT_NEWTON_STEPS_COUNT).x
 
 
 def _is_disjoint(one: Sequence[Any], other: Sequence[Any]) -> bool:

@@ -19,14 +19,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...budgets import JOINT_FORMS_MAX, QUATERNION_POWERS_MAX
 from ...geometry.ranks import decompose_matrix
 from ...geometry.vectors import Array, hat
 from ...tolerances import FORM_PIVOT_MIN_FRACTION
-from .pose_bound import PRIME, residues
+from .pose_bound import PRIME, QUATERNION_POWERS_MAX, residues
 
 if TYPE_CHECKING:
     from .carrying_leg_system import CarriedCondition, CarriedPlatform, Turn
+
+JOINT_FORMS_MAX = 750
+"""Largest number of forms of conditions on a leg's joints."""
 
 
 @dataclass(frozen=True, eq=False)

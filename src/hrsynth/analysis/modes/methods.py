@@ -37,10 +37,7 @@ def without_couplings(
     if not mechanism.couplings:
         return None
     held = {each.joint for each in measured.observation_model.observations if isinstance(each, Encoder)}
-    ties = [
-        {mechanism.carrier(each, link).name for link in (each.predecessor, each.successor)}
-        for each in mechanism.couplings
-    ]
+    ties = [{each.driver, each.driven} for each in mechanism.couplings]
     tied = set(held)
     while more := set().union(*(tie for tie in ties if tie & tied)) - tied:
         tied |= more
@@ -65,7 +62,7 @@ def without_couplings(
             for each in make_encoders(loose.mechanism, loose.mechanism.joints[name], of.get(name, ""))
         ),
     )
-    found = MeasuredRobot(loose, loose.measuring(seen))
+    found = MeasuredRobot(loose, loose.all_samples.measure(seen))
     return (found, at) if found.rank == loose.dof and loose.decomposition.labels == setup.decomposition.labels else None
 
 

@@ -10,12 +10,10 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 
 from ...batch.pose_continuation import track_to_pose
-from ...budgets import MODES_TIME_LIMIT_S
 from ...constraints.pattern import list_placing_links
 from ...errors import BadRequest, ExternalSolverFailure, MissingExtra, PoseReachFailure, TooLarge, UnsupportedLocus
 from ...kinematics.assembly import Assembly, build_from_link_poses
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.joint_coordinates import track_to_joints
 from ...kinematics.limits import list_joints_beyond
 from ...kinematics.tasks import Task
 from ...kinematics.velocity_relation import ObservationModel
@@ -27,11 +25,14 @@ from ...records import FLAT, OPTIONAL, As, Shown, recorded
 from ...results import Result
 from ...tolerances import MEASUREMENT_BOUND, NEAR_POSE_DIFFERENCE_TOL
 from ..analysis_declaration import analysis
+from ..branch.joint_line import follow_line
 from ..formation import Formation
 from ..measured import MeasuredRobot
-from ..observed import POINTS, UNLIMITED, CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SensorLike
+from ..observation_inputs import POINTS, CameraLike, LegsLike, Seed, SensorLike
+from ..observed import ObservedRobot, RobotLike
+from ..setup_records import LIMITS_IGNORED
 from .assembly_mode import AssemblyMode, ModeReader, found_mode
-from .branches import Model
+from .branches import MODES_TIME_LIMIT_S, Model
 from .carrying_leg_modes import solve_carried
 from .carrying_leg_system import CarriedPlatform
 from .formation_modes import formation_modes
@@ -221,7 +222,7 @@ class AssemblyModes(Result, shown_as="modes"):
             MeantLegs(each.where, [self.labels[k] for k in each.legs], each.defect) for each in self.found.snapped
         ],
     )
-    limits_ignored = Shown(list[str], lambda self: self.setup.limits_ignored, UNLIMITED)
+    limits_ignored = LIMITS_IGNORED
 
     def _listed(self, modes: Iterable[AssemblyMode]) -> list[ListedMode]:
         """Return modes with the poses of all links of a formation."""
@@ -339,8 +340,8 @@ def modes(
     if isinstance(asked, ModeNumber):
         at, asked = at_mode(modes(setup), asked), None
     elif isinstance(asked, JointPose):
-        at, asked = track_to_joints(setup.all_samples.start, setup.motion, asked), None
-    setup = setup if asked is None else setup.telling([asked])
+        at, asked = follow_line(setup.all_samples.start, setup.motion, asked), None
+    setup = setup if asked is None else setup.printing_like([asked])
     motion, wanted = setup.motion, None
     goal = at if isinstance(at, ClosedConfiguration) else setup.all_samples.start
     if asked is not None:

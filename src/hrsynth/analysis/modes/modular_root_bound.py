@@ -18,8 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from ...budgets import CAP_OF_MULTIPLES, LARGEST_MULTIPLES
 from .polynomials import Quadric
+
+CAP_OF_MULTIPLES, LARGEST_MULTIPLES = 4, 250
+"""Largest degree in a group of unknowns, and number of monomials, of a bound by multiples of quadrics."""
 
 PRIME = (1 << 62) - 87
 ROOT = pow(5, (PRIME - 1) // 4, PRIME)

@@ -13,7 +13,6 @@ from typing import Annotated
 
 import numpy as np
 
-from ...budgets import NEAR_MODE_STEPS_MAX
 from ...errors import LoopClosureFailure
 from ...geometry.so3 import compute_rotation_angle
 from ...geometry.vectors import Array
@@ -27,8 +26,6 @@ from ...records import As, Recorded
 from ...results import Value
 from ...tolerances import (
     CLOSURE_SOLVER_TOL,
-    CONTINUOUS_FAMILY_STEP_MAX,
-    CURVATURE_DIFFERENCE_STEP_MAX,
     GEOMETRY_DIFFERENCE_TOL,
     NEAR_POSE_DIFFERENCE_TOL,
     NONZERO_SINGULAR_VALUE_MIN,
@@ -37,6 +34,13 @@ from ..accuracy.measurement_bounds import require_single_angle
 from ..observed import ObservedRobot
 from .assembly_mode import AssemblyMode, found_mode
 from .self_motions import bodies_apart
+
+CONTINUOUS_FAMILY_STEP_MAX = 0.02
+"""Step (characteristic lengths, radians) over which values of a near mode must stay within the bound in a family."""
+CURVATURE_DIFFERENCE_STEP_MAX = 1e-4
+"""Step (characteristic lengths, radians) of the differences of such a slope."""
+NEAR_MODE_STEPS_MAX = 60
+"""Steps from a candidate to a near mode."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -67,9 +71,10 @@ class NearMode(AssemblyMode):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StationaryPose(Value):
-    """Closed configuration at which the difference of measured values is stationary, the largest of these differences
-    (rad); ``isolated``: a minimum, which attracts the servo loop; ``family``: one of a continuous family with
-    differences up to a bound."""
+    """Closed configuration at which ½‖e‖² is stationary, e being the differences of the measured values from the
+    goal's. ``angle`` is the largest of them (rad). ``isolated``: a strict minimum, which attracts the servo loop.
+    ``family``: the observations leave the platform a dof there, and a step along it either way keeps all
+    differences within the bound."""
 
     configuration: ClosedConfiguration
     angle: float

@@ -21,13 +21,16 @@ from ...mechanism.cameras import CameraObservation, FixedValueLocus
 from ...mechanism.legs import LegDecomposition
 from ...mechanism.observations.direction import Direction, SeenAxis
 from ...mechanism.observations.encoder import Encoder
-from ...tolerances import CHAIN_ROUNDING, EXACT_INCIDENCE_TOL, MEASURED_VALUE_TOL, MOVED_AXIS_LEVER_MAX
+from ...tolerances import CHAIN_ROUNDING, EXACT_INCIDENCE_TOL, MOVED_AXIS_LEVER_MAX
 from ..measured import MeasuredRobot
 from .conditions import AtAngle, OnMovingPlane, OnPlane, OnRevolution, PoseCondition
 from .goal_error import ROTATION_LEVER_MIN
 from .leg_conditions import OriginAndUnit
 from .loci import Circle, Line, Plane, Point, Reach, Sphere
 from .tips import KeptAngle, Tip, TipLoci, tip_loci
+
+MEASURED_VALUE_TOL = 1e-3
+"""Difference of measured values (unit vectors; characteristic lengths) up to which a mode has the desired value."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,9 +75,7 @@ def sights(
         elif isinstance(each, CameraObservation | SeenAxis) and base in ends and body in bodies:
             loci = each.loci(each.sighting(goal.pose(reference), goal.pose(each.link)))
             if not loci or decomposition.point is not None:
-                raise UnsupportedLocus(
-                    decomposition.mechanism.name, f"the locus of {each.kind} {each.leg} is not known"
-                )
+                raise UnsupportedLocus(decomposition.mechanism.name, f"the locus of {each.text} is not known")
             found.append(PlatformObservation(each, body, loci, body == reference))
         else:
             rest.append(_of_leg(decomposition, each))
@@ -94,9 +95,7 @@ def _of_leg(decomposition: LegDecomposition, seen: Observation) -> Observation:
             else isinstance(seen, Direction) and (seen.link in leg.links)
         ):
             return replace(seen, leg=leg.label)
-    raise UnsupportedLocus(
-        decomposition.mechanism.name, f"{seen.kind} {seen.leg} is of no leg and not between base and platform"
-    )
+    raise UnsupportedLocus(decomposition.mechanism.name, f"{seen.text} is of no leg and not between base and platform")
 
 
 def _with_sights(confined: TipLoci, seen: Sequence[PlatformObservation], goal: ClosedConfiguration) -> TipLoci:
@@ -119,7 +118,7 @@ def _with_sights(confined: TipLoci, seen: Sequence[PlatformObservation], goal: C
         turned = each.back != back  # camera and point change places: all is symmetric, or nothing rotates
         for locus in each.loci:
             if locus.turns and confined.motion == "planar":
-                raise UnsupportedLocus(goal.model.mechanism.name, f"{each.seen.kind} {label} keeps an angle in a plane")
+                raise UnsupportedLocus(goal.model.mechanism.name, f"{each.seen.text} keeps an angle in a plane")
             if locus.turns:
                 pairs = [(n, locus.place) if turned else (locus.place, n) for n in locus.normals if turning]
                 angles += [KeptAngle(label, each.body, X[:3, :3].T @ d, axis, 0.0) for d, axis in pairs]

@@ -14,21 +14,20 @@ import numpy as np
 
 from ...errors import GeometryAmbiguous
 from ...geometry.vectors import Array
-from ...tolerances import (
-    LOCUS_DISTANCE_TOL,
-    LOCUS_EXTENT_TOL,
-    NEAR_MODE_DIFFERENCE_TOL,
-    NEAR_MODE_DISTANCE_MAX,
-    NEAR_MODE_START_MISS_MAX,
-    RANK_GAP_MIN,
-    SNAP_DISTANCE_MAX,
-    TIP_ROUNDING,
-)
+from ...tolerances import LOCUS_DISTANCE_TOL, LOCUS_EXTENT_TOL, NEAR_MODE_DISTANCE_MAX, RANK_GAP_MIN, TIP_ROUNDING
 from .constrained_platform import System
 from .loci import Sphere, length
 from .quadrics import UNIT, Conic, conditions
 from .rigid import Spatial
 from .roots import ROOT_ISOLATION_BITS_COUNT
+
+NEAR_MODE_START_MISS_MAX = 0.3
+"""Distance (characteristic lengths) beyond which a start leads to no near mode."""
+NEAR_MODE_DIFFERENCE_TOL = 1e-6
+"""Difference of poses and distances (characteristic lengths) below which two stationary poses are one."""
+SNAP_DISTANCE_MAX = 1e-5
+"""Distance (characteristic lengths) up to which joint centres are snapped, if the next one is ``RANK_GAP_MIN``
+larger."""
 
 
 def tip_rounding(system: System, at: Array) -> float:

@@ -9,15 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from ...budgets import LARGEST_LOOPS, LOOP_SYSTEMS, PLANAR_STARTS
 from ...errors import ExternalSolverFailure
 from ...geometry.vectors import Array, freeze_array
 from ...kinematics.configuration import ClosedConfiguration
+from ...solving.krawczyk import Polynomial
+from ...solving.newton import approach_zeros, collect_zeros
+from ...tolerances import LARGEST_LOOPS, LOOP_SYSTEMS, PLANAR_STARTS
 from ..measured import MeasuredRobot
 from .branches import Model
 from .planar_loops import Exponents, PlanarLoops, SumPart
 from .planar_reading import systems
-from .polynomials import Polynomial
 from .pose_boxes import PoseBox, UnitLength, zeros
 from .solve import SystemMode, SystemModes
 
@@ -28,34 +29,21 @@ def proposals(forms: Sequence[dict[Exponents, complex]], angles: int, enough: in
     monomials = sorted({e for form in forms for e in form})
     M = np.array(monomials, dtype=float)
     C = np.array([[form.get(e, 0j) for e in monomials] for form in forms])
-    rng, found = np.random.default_rng(0), np.zeros((0, M.shape[1]), dtype=complex)
+    rng = np.random.default_rng(0)
     model = [*range(angles, 2 * angles), *range(angles), *range(2 * angles, M.shape[1])]
-    for _ in range(PLANAR_STARTS):
+
+    def evaluate(x: Array) -> tuple[Array, Array]:
+        x = np.where(x == 0, 1e-200, x)
+        values = np.exp(np.log(x) @ M.T)
+        return values @ C.T, ((values[:, None, :] * C) @ M) / x[:, None, :]
+
+    def draw() -> Array:
         x = rng.normal(size=(64, M.shape[1])) + 1j * rng.normal(size=(64, M.shape[1]))
         x[:, angles : 2 * angles] = 1.0 / x[:, :angles]
-        with np.errstate(all="ignore"):
-            for _ in range(40):
-                values = np.exp(np.log(x) @ M.T)
-                J = ((values[:, None, :] * C) @ M) / x[:, None, :]
-                good = np.all(np.isfinite(J), axis=(1, 2))
-                x, values, J = x[good], values[good], J[good]
-                F = (values @ C.T)[:, :, None]
-                try:
-                    step = np.linalg.solve(J, F)[:, :, 0]
-                except np.linalg.LinAlgError:
-                    step = (np.linalg.pinv(J) @ F)[:, :, 0]
-                x = x - step
-                x[x == 0] = 1e-200
-            close_ = np.abs(step).max(axis=1) < 1e-10 * (1.0 + np.abs(x).max(axis=1))
-        for each in x[close_]:
-            for y in (each, each[model].conj()):
-                if len(found) < enough and not np.any(
-                    np.abs(found - y).max(axis=1, initial=0.0) < 1e-6 * (1.0 + np.abs(y).max())
-                ):
-                    found = np.vstack([found, y])
-        if len(found) >= enough:
-            break
-    return found
+        return x
+
+    ends = (approach_zeros(evaluate, draw(), steps=40) for _ in range(PLANAR_STARTS))
+    return collect_zeros(ends, enough, lambda x: x[:, model].conj())[:enough]
 
 
 def solve_loops(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0) -> tuple[Model, SystemModes]:

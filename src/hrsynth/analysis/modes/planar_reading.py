@@ -10,7 +10,6 @@ from itertools import combinations, permutations
 
 import numpy as np
 
-from ...budgets import LARGEST_GEAR
 from ...constraints.pattern import list_placing_links
 from ...errors import UnsupportedLocus
 from ...geometry.vectors import Array, build_plane_axes, cross, transform
@@ -18,7 +17,7 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism import Joint, JointType, Observation, graphs
 from ...mechanism.observations.direction import Direction
 from ...mechanism.observations.encoder import Encoder
-from ...tolerances import DIRECTION_SINE_TOL, GEOMETRY_DIFFERENCE_TOL, POINT_DISTANCE_TOL
+from ...tolerances import DIRECTION_SINE_TOL, GEOMETRY_DIFFERENCE_TOL, LARGEST_GEAR, POINT_DISTANCE_TOL
 from ..measured import MeasuredRobot
 from .planar_loops import Exponents, PlanarLoop, PlanarLoops, Sum
 
@@ -217,17 +216,17 @@ class _PlanarJoints:
                 if joints is None and float(np.linalg.norm(cross(direction, self.normal))) > DIRECTION_SINE_TOL:
                     yield each.link, each.seen_from or self.reference
             elif not isinstance(each, Encoder) or each.joint not in self.mechanism.joints:
-                raise self._refuse(f"{each.kind} {each.leg} is neither a direction nor a joint's coordinate")
+                raise self._refuse(f"{each.text} is neither a direction nor a joint's coordinate")
             elif not self.mechanism.joints[each.joint].type.has_translation and (
                 joints is None or each.joint in joints
             ):
                 yield self.mechanism.joints[each.joint].links
 
     def _gears(self) -> Iterator[tuple[str, float, Joint, Joint]]:
-        """Names, ratios and the joints that carry what turns, and what is turned."""
-        carriers = {joint.successor: joint for joint in reversed(self.joints) if joint.in_tree}
+        """Names, ratios, drivers and driven joints of the couplings."""
+        joints = {joint.name: joint for joint in self.joints}
         for each in self.mechanism.couplings:
-            yield each.name, each.ratio, carriers[each.predecessor], carriers[each.successor]
+            yield each.name, each.ratio, joints[each.driver], joints[each.driven]
 
     def _moves(self) -> dict[str, tuple[int, float]]:
         """Return the number of each P's slide, -1 where it is fixed, and how many times its length the P moves."""

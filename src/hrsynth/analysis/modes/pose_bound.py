@@ -21,10 +21,14 @@ from typing import Any
 
 import numpy as np
 
-from ...budgets import LARGEST_FORMS, QUATERNION_POWERS_MAX
 from ...geometry.vectors import Array
 from .conditions import PoseCondition
 from .pose_forms import ROTATION, SquareForms, exponents
+
+LARGEST_FORMS, FORMS_SECONDS, FEW_FORMS_SECONDS = 1100, 46.0, 0.1
+"""Largest number of forms of a degree in linear algebra, and estimated time (s) for that many, and for few."""
+QUATERNION_POWERS_MAX = 4
+"""Powers of q · q tried to exclude extraneous solutions."""
 
 PRIME = (1 << 62) - 57
 

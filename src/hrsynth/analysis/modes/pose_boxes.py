@@ -14,10 +14,14 @@ from typing import Any
 import numpy as np
 
 from ...geometry.vectors import Array
-from ...tolerances import BOX_SEPARATION_TOL, NEARLY_REAL_POSE_TOL, NUMBER_ROUNDING
+from ...solving.krawczyk import Polynomial, enclose_zero
+from ...solving.newton import approach_zeros
+from ...tolerances import BOX_SEPARATION_TOL, NUMBER_ROUNDING
 from .conditions import PoseCondition
-from .polynomials import Polynomial, krawczyk
 from .pose_forms import ROTATION, Poses, SquareForms
+
+NEARLY_REAL_POSE_TOL = 1e-9
+"""Imaginary parts of a proposed pose below which a real one is searched."""
 
 POSE_BOX_BITS_COUNT = 128
 """Bits of the enclosures."""
@@ -152,8 +156,9 @@ def refine_poses(forms: SquareForms, y: Array, p: Array) -> Array:
     conditions, poses = (*forms.planes, *forms.others), forms.poses
     E, moves = poses.turns, poses.moves
     M = [[np.einsum("ikab,k,ac,bd->icd", ROTATION, v, E, E) for v in (c.b, c.c)] for c in conditions]
-    x, turned = np.hstack([y, p @ moves]), E.shape[1]
-    for _ in range(PROPOSAL_NEWTON_STEPS_COUNT):
+    turned = E.shape[1]
+
+    def evaluate(x: Array) -> tuple[Array, Array]:
         y, p = x[:, :turned], x[:, turned:] @ moves.T
         F, J = [np.sum(y * y, axis=1) - 1.0], [np.hstack([2.0 * y, 0.0 * x[:, turned:]])]
         for c, (b, a) in zip(conditions, M, strict=True):
@@ -161,19 +166,11 @@ def refine_poses(forms: SquareForms, y: Array, p: Array) -> Array:
             at, d = p + np.einsum("nia,na->ni", by_x, y), np.einsum("nia,na->ni", by_d, y)
             along, across = c.slopes(at, d, np.asarray)
             F.append(c.value(at, d, np.asarray))
-            J.append(
-                np.hstack(
-                    [
-                        2.0 * (np.einsum("ni,nia->na", along, by_x) + np.einsum("ni,nia->na", across, by_d)),
-                        along @ moves,
-                    ]
-                )
-            )
-        try:
-            x = x - np.linalg.solve(np.stack(J, axis=1), np.stack(F, axis=1)[:, :, None])[:, :, 0]
-        except np.linalg.LinAlgError:
-            break
-    return x
+            turning = np.einsum("ni,nia->na", along, by_x) + np.einsum("ni,nia->na", across, by_d)
+            J.append(np.hstack([2.0 * turning, along @ moves]))
+        return np.stack(F, axis=1), np.stack(J, axis=1)
+
+    return approach_zeros(evaluate, np.hstack([y, p @ moves]), steps=PROPOSAL_NEWTON_STEPS_COUNT).x
 
 
 def enclose_poses(
@@ -202,9 +199,9 @@ def enclose_poses(
                 each: PoseBox | None = replace(model, middle=model.middle.conj())
             elif np.all(np.isfinite(x)):
                 start = [arb(v) for v in x.real.tolist()] if real else [acb(v.real, v.imag) for v in x.tolist()]
-                each = as_box(krawczyk(equations, start), real, turned)
+                each = as_box(enclose_zero(equations, start), real, turned)
                 if each is None and turned == 4 and np.abs(x.imag).max() > COMPLEX_ZERO_IMAGINARY_MIN:
-                    each = as_box(krawczyk(exact, start), False, turned)
+                    each = as_box(enclose_zero(exact, start), False, turned)
                     each = None if each is None else replace(each, rounded=True)
             else:
                 each = None
@@ -241,7 +238,7 @@ def zeros(equations: Sequence[Polynomial], proposed: Iterable[Array]) -> tuple[l
         for x in proposed:
             real = bool(np.abs(x.imag).max(initial=0.0) < NEARLY_REAL_POSE_TOL * (1.0 + np.abs(x).max(initial=0.0)))
             start = [arb(v) for v in x.real.tolist()] if real else [acb(v.real, v.imag) for v in x.tolist()]
-            box = as_box(krawczyk(equations, start), real, 0)
+            box = as_box(enclose_zero(equations, start), real, 0)
             if box is None:
                 lost += 1
             elif box.is_disjoint_from(found):

@@ -12,7 +12,6 @@ from math import prod
 
 import numpy as np
 
-from ...budgets import FEW_FORMS_SECONDS, FORMS_SECONDS, LARGEST_FORMS, LEG_SOLUTION_CHOICES_MAX, MODES_TIME_LIMIT_S
 from ...constraints.pattern import list_leg_ends
 from ...errors import ExternalSolverFailure, UnsupportedLocus
 from ...geometry.so3 import convert_from_quaternion, convert_rotations_to_vectors, convert_vectors_to_rotations
@@ -20,13 +19,13 @@ from ...geometry.vectors import Array, build_pose, freeze_array, invert_pose
 from ...kinematics.configuration import ClosedConfiguration
 from ...tolerances import LOCUS_DISTANCE_TOL, MOVED_AXIS_LEVER_MAX, POINT_DISTANCE_TOL, RANK_GAP_MIN, RELATION_ANGLE_TOL
 from ..measured import MeasuredRobot
-from .branches import Model, together
+from .branches import LEG_SOLUTION_CHOICES_MAX, MODES_TIME_LIMIT_S, Model, together
 from .conditions import OnPlane, PoseCondition
 from .constrained_platform import System
 from .leg_conditions import Branches, OriginAndUnit, leg_conditions, rigid_platform
 from .observation_loci import PlatformObservation, conditions, sights
 from .overdetermined import words
-from .pose_bound import bound
+from .pose_bound import FEW_FORMS_SECONDS, FORMS_SECONDS, LARGEST_FORMS, bound
 from .pose_boxes import PoseBox, enclose_poses, is_box_excluded, told_far
 from .pose_forms import Poses, SquareForms, proposals
 from .solve import SystemMode, SystemModes
@@ -180,8 +179,9 @@ def solve_posed(
     if needed > max(time_limit, FEW_FORMS_SECONDS * (len(systems) == 1)):
         raise ExternalSolverFailure(
             "conditions on the pose",
-            f"{len(systems)} combinations of leg solutions, {forms.size} forms each, need "
-            f"about {needed:.2g} s: too many (the time limit is {time_limit:g} s)",
+            f"{len(systems)} combinations of leg solutions, {forms.size} monomials each, need "
+            f"about {needed:.2g} s, more than the time limit of {time_limit:g} s",
+            "Observe other legs, or raise --time-limit.",
         )
     for system in systems:
         found.append(_judge(system, _forms(measured, system), system is first))
@@ -198,8 +198,8 @@ def _forms(measured: MeasuredRobot, system: PosedPlatform) -> SquareForms:
     if forms.size > LARGEST_FORMS:
         raise ExternalSolverFailure(
             "conditions on the pose",
-            f"{forms.most} solutions at most, among {forms.size} forms of degree "
-            f"{forms.degree}: too many (at most {LARGEST_FORMS})",
+            f"a polynomial system with up to {forms.most} solutions needs {forms.size} monomials of degree "
+            f"{forms.degree}, more than the {LARGEST_FORMS} that this method handles",
         )
     return forms
 

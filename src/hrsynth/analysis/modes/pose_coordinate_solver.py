@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from ...geometry.vectors import Array
-from ...tolerances import BALL_ZERO, BOX_SEPARATION_TOL, SOLUTION_DISTANCE_MAX
+from ...solving.krawczyk import enclose_zero
+from ...tolerances import BOX_SEPARATION_TOL, SOLUTION_DISTANCE_MAX
 from .bounds import Bound
 from .constrained_platform import System
 from .homotopy import ends
@@ -24,7 +25,7 @@ from .infinity import beyond
 from .loci import Point
 from .modular_root_bound import combine_quadrics
 from .msolve import Parametrisation, parametrise
-from .polynomials import Quadric, krawczyk
+from .polynomials import Quadric
 from .quadrics import UNIT, Balls, MovingPoint, PoseParametrization, PoseSystem, RoundedConic, Within
 from .roots import (
     PRECISION_DOUBLINGS_MAX,
@@ -36,6 +37,9 @@ from .roots import (
     is_real,
     is_sharp,
 )
+
+BALL_ZERO = 2.0**-256
+"""Radius of a ball containing zero at which its number is zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +201,7 @@ def _has_separate_far_boxes(part: PoseSystem, far: Sequence[Sequence[Any]]) -> b
         for values in far:
             sizes = [2 ** max(0, math.frexp(float(abs(v).upper()))[1]) for v in values]
             D = np.diag(np.array([1, *sizes], dtype=object))
-            box = krawczyk(
+            box = enclose_zero(
                 [Quadric(D @ each.A @ D) for each in quadrics],
                 [v / size for v, size in zip(values, sizes, strict=True)],
             )
@@ -218,7 +222,7 @@ def _has_separate_boxes(
     boxes = list(real)
     upper = [each for each in values if next(float(v.imag) for v in each if not v.imag.is_zero()) > 0]
     for start in upper:
-        box = krawczyk(thick, start)
+        box = enclose_zero(thick, start)
         if box is None:
             return False
         boxes += [box, [v.conjugate() for v in box]]

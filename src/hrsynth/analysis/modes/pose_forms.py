@@ -22,13 +22,13 @@ import numpy as np
 
 from ...geometry.ranks import decompose_matrix
 from ...geometry.vectors import Array, build_plane_axes, cross
-from ...tolerances import (
-    EXTRANEOUS_QUATERNION_TOL,
-    FORM_PIVOT_MIN_FRACTION,
-    INDEPENDENT_PLANES_SINE_MIN,
-    INDEPENDENT_RATES_MIN,
-)
+from ...tolerances import FORM_PIVOT_MIN_FRACTION, INDEPENDENT_RATES_MIN
 from .conditions import OnPlane, PoseCondition
+
+INDEPENDENT_PLANES_SINE_MIN = 1e-3
+"""Least sine between a plane's normal and the span of the other normals that determine the position."""
+EXTRANEOUS_QUATERNION_TOL = 1e-5
+"""|q · q| of a unit quaternion below which it is extraneous."""
 
 RANDOM_COORDINATE_MAX = 1.5
 """Range of the random s (sizes), of either sign."""

@@ -20,9 +20,11 @@ from typing import Any
 import numpy as np
 
 from ...geometry.vectors import Array, build_plane_axes, cross
-from ...tolerances import EXACT_PARALLEL_SINE_TOL
 from .loci import Circle, Curve, Line, Plane, Point, Reach, Sphere, length
 from .polynomials import Quadric
+
+EXACT_PARALLEL_SINE_TOL = 1e-13
+"""Sine of the angle below which two directions of loci are exactly parallel: it decides the solutions at infinity."""
 
 COORDINATE_BITS_COUNT = 52
 """Coordinates are integers in units of the size times 2 to the minus this."""

@@ -16,14 +16,20 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from ...tolerances import DOUBLE_SOLUTION_DISTANCE_TOL, RANK_GAP_MIN, SHARP_ROOT, SOLUTION_DISTANCE_MAX
+from ...solving.krawczyk import Polynomial, enclose_zero
+from ...tolerances import RANK_GAP_MIN, SOLUTION_DISTANCE_MAX
 from .loci import Circle, Curve
-from .polynomials import Eliminant, Equation, Polynomial, cycle, height, krawczyk, pair, primitive, univariate, without
+from .polynomials import Eliminant, Equation, cycle, height, pair, primitive, univariate, without
 from .quadrics import UNIT, Balls, Conic, Within, WorkingFrame, parameter
 from .square_systems import SquareSystem
 
 if TYPE_CHECKING:
     from flint import fmpz_poly
+
+DOUBLE_SOLUTION_DISTANCE_TOL = 1e-6
+"""Distance between two solutions, in their parameters, below which the pose counts as singular."""
+SHARP_ROOT = 2.0**-60
+"""Relative radius of a ball above which a solution is computed with more digits."""
 
 ROOT_ISOLATION_BITS_COUNT = 128
 """Bits with which roots are isolated first."""
@@ -308,7 +314,7 @@ class SolutionEncloser(ABC):
     def _enclose(self, start: Sequence[Any], multiplicity: int) -> RealSolution:
         """The box of a real solution: for the exact input where that can be proved, else for the rounded one."""
         for each in (self.thick, self.equations):
-            box = krawczyk(each, start)
+            box = enclose_zero(each, start)
             if box is not None:
                 own = self.parameters(box)
                 return RealSolution(own, self.misses(own, box), 1, True, each is self.thick)
@@ -334,7 +340,7 @@ class _SquareEncloser(SolutionEncloser):
 
     def is_proved_complex(self, values: Sequence[Any]) -> bool:
         """Return True if a complex solution is proved to be no real one for all input in the balls."""
-        box = krawczyk(self.thick, values)
+        box = enclose_zero(self.thick, values)
         return box is not None and any(not v.imag.contains(0) for v in box)
 
     @property

@@ -11,12 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...budgets import (
-    MODE_SEARCH_ITERATIONS_MAX,
-    MODE_SEARCH_QUIET_STARTS_COUNT,
-    MODE_SEARCH_STARTS_MAX,
-    SEARCH_SELF_MOTIONS_MAX,
-)
 from ...errors import UndefinedValue
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
@@ -28,11 +22,17 @@ from ...progress import report
 from ...tolerances import (
     CLOSURE_RESIDUAL_TOL,
     CLOSURE_SOLVER_TOL,
+    MODE_SEARCH_ITERATIONS_MAX,
+    MODE_SEARCH_QUIET_STARTS_COUNT,
+    MODE_SEARCH_STARTS_MAX,
     NEAR_MODE_DISTANCE_MAX,
     NONZERO_SINGULAR_VALUE_MIN,
     RELATION_ANGLE_TOL,
 )
 from .self_motions import SelfMotion, bodies_apart, self_motion
+
+SEARCH_SELF_MOTIONS_MAX = 12
+"""Largest number of self-motions followed by one search."""
 
 
 @dataclass(frozen=True, eq=False)

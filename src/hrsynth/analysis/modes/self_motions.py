@@ -16,7 +16,6 @@ from typing import Annotated
 
 import numpy as np
 
-from ...budgets import MODE_SEARCH_ITERATIONS_MAX, SELF_MOTION_STEP_HALVINGS_MAX, SELF_MOTION_STEPS_MAX
 from ...geometry.ranks import compute_range_basis
 from ...geometry.screws import compute_point_velocity
 from ...geometry.so3 import convert_rotations_to_vectors
@@ -30,15 +29,26 @@ from ...records import As, Record, Recorded, Shown
 from ...tolerances import (
     CLOSURE_RESIDUAL_TOL,
     CLOSURE_SOLVER_TOL,
+    MODE_SEARCH_ITERATIONS_MAX,
     NONZERO_SINGULAR_VALUE_MIN,
     PSEUDOINVERSE_CUTOFF_FRACTION,
     RELATION_ANGLE_TOL,
-    SELF_MOTION_BEND_TOL,
-    SELF_MOTION_LENGTH_MIN,
-    SELF_MOTION_PROBE_FRACTION,
-    SELF_MOTION_SINGULAR_TOL,
-    SELF_MOTION_STEP_MAX,
 )
+
+SELF_MOTION_STEP_MAX = 0.1
+"""Longest step (nv,) along a self-motion (characteristic lengths, radians)."""
+SELF_MOTION_PROBE_FRACTION = 0.01
+"""Length of random steps, closed again, that count the finite mobility; the closed set bends little over it."""
+SELF_MOTION_BEND_TOL = 0.3
+"""Largest correction of such a step as a fraction of it, and largest 1 - cosine between successive tangents."""
+SELF_MOTION_SINGULAR_TOL = 1e-3
+"""Relative singular value of loops and measurements below which a self-motion is searched; following it decides."""
+SELF_MOTION_LENGTH_MIN = 0.2
+"""Distance (characteristic lengths and radians) over which a self-motion must stay closed."""
+SELF_MOTION_STEPS_MAX = 100
+"""Steps of a self-motion in each direction."""
+SELF_MOTION_STEP_HALVINGS_MAX = 6
+"""Halvings of such a step."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,6 @@ import numpy as np
 from ...geometry.vectors import Array, freeze_array
 from ...results import Value
 from ...tolerances import (
-    DOUBLE_SOLUTION_DISTANCE_TOL,
     LOCUS_DISTANCE_TOL,
     NEAR_MODE_DISTANCE_MAX,
     RELATION_ANGLE_TOL,
@@ -36,7 +35,7 @@ from .overdetermined import (
 )
 from .pose_coordinate_solver import ProposedSolutions, by_msolve, enclose_roots, propose_roots, wholes
 from .quadrics import PoseSystem
-from .roots import RealSolution, SolutionSet, has_nearly_double_solution, solve_square
+from .roots import DOUBLE_SOLUTION_DISTANCE_TOL, RealSolution, SolutionSet, has_nearly_double_solution, solve_square
 from .square_systems import SquareSystem
 from .translating import TranslatingPlatform
 

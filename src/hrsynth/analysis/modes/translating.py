@@ -12,11 +12,12 @@ import numpy as np
 
 from ...errors import BadRequest
 from ...geometry.vectors import Array, cross
-from ...tolerances import EXACT_PARALLEL_SINE_TOL, LOCUS_DISTANCE_TOL, TIP_ROUNDING
+from ...tolerances import LOCUS_DISTANCE_TOL, TIP_ROUNDING
 from .constrained_platform import TranslatingBodies
 from .loci import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, extent, length, shift_reach
 from .polynomials import Equation
 from .quadrics import (
+    EXACT_PARALLEL_SINE_TOL,
     Conic,
     MovingPoint,
     Numbers,

@@ -14,7 +14,6 @@ from typing import Annotated
 import numpy as np
 
 from ...batch.configuration_builder import ConfigurationBuilder
-from ...budgets import RANK_DESCENTS, WEAKEST_POSE_STARTS_COUNT
 from ...constraints.condition import Condition, NamedCondition
 from ...constraints.pattern import ConstraintPattern, PatternValues
 from ...errors import Disagreement, UndefinedValue
@@ -38,7 +37,10 @@ from ...tolerances import (
     SLOPE_STEP_MAX,
 )
 from .batch_spectrum import SPECTRUM_CHECKED_POSES_COUNT, Quick
-from .rank_descent import compute_twist_rates, descend_to_rank_loss, step_from
+from .rank_descent import RANK_DESCENTS, compute_twist_rates, descend_to_rank_loss, step_from
+
+WEAKEST_POSE_STARTS_COUNT = 8
+"""Further starts, the poses of smallest singular value, of walks that cross no singularity."""
 
 CONDITION_CHECK_CHUNK_COUNT = 250
 LOCUS_POSES_COUNT = 10

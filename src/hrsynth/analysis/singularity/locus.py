@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...batch.pose_continuation import explain_grid_dependence, sweep, track_to_pose
-from ...budgets import BOUNDARY_REFINEMENT_COUNT, COARSE_GRID_SIDE_COUNT, LOCUS_SIDES
 from ...errors import BadRequest, NoReachablePose, PoseReachFailure
 from ...geometry.so3 import turn_about
 from ...geometry.vectors import Array
@@ -24,12 +23,22 @@ from ...mechanism.pose import Grid, Pose, convert_to_pose
 from ...progress import report
 from ...records import As, Number, Recorded, Shown, recorded
 from ...results import Value
-from ...tolerances import ON_PLANE, RELATION_ANGLE_TOL, SINGULAR_POSE_DISTANCE_TOL
+from ...tolerances import RELATION_ANGLE_TOL, SINGULAR_POSE_DISTANCE_TOL
 from ..measured import MeasuredRobot
-from ..observed import CameraLike, ObservedRobot, SensorLike
+from ..observation_inputs import CameraLike, SensorLike
+from ..observed import ObservedRobot
 from .batch_spectrum import Quick
 from .condition_check import compute_smallest_value, compute_spectrum, descend
 from .rank_curve import PlaneOfPoses
+
+ON_PLANE = 10**-4.5
+"""Deviation (characteristic lengths, radians) up to which a singular pose lies in a plane of poses."""
+COARSE_GRID_SIDE_COUNT = 25
+"""Poses per side of the grid that finds the reach in a plane."""
+BOUNDARY_REFINEMENT_COUNT = 4
+"""Refinement of the border of that grid."""
+LOCUS_SIDES = (2.5, 5.0)
+"""Half-sides of that grid (characteristic lengths); the second if the robot reaches the border of the first."""
 
 ISOLATED_POSE_STARTS_COUNT = 8
 """Valleys of the smallest singular value from which an isolated singular pose is sought."""
@@ -92,7 +101,7 @@ def compute_locus(
     hidden = _require_controllable(setup)
     real = None
     if any(joint.is_actuated for joint in setup.mechanism.joints.values()):
-        driven = MeasuredRobot.of_motors(setup)
+        driven = MeasuredRobot.of(setup, real=True)
         real = driven if driven.rank == setup.dof else None
     return _compute_both_loci(hidden, real, None if plane is None else convert_to_pose(plane), steps)
 
@@ -110,7 +119,7 @@ def require_plane(setup: ObservedRobot, plane: Pose | str | None) -> None:
 
 def _require_controllable(setup: ObservedRobot) -> MeasuredRobot:
     """The hidden robot; raises ``BadRequest`` where it has no locus."""
-    hidden = MeasuredRobot.of_directions(setup)
+    hidden = MeasuredRobot.of(setup)
     if hidden.verdict.rank < setup.dof:
         raise BadRequest(
             f"{setup.robot.name} has no singularity locus: a platform dof is unobserved at every pose",

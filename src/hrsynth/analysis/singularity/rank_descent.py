@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...budgets import RANK_STEPS
 from ...errors import UndefinedValue
-from ...geometry.gauss_newton import Residual, descend
 from ...geometry.ranks import compute_kernel_basis, compute_range_basis
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
@@ -18,6 +16,7 @@ from ...kinematics.velocity_relation import (
     compute_relation,
 )
 from ...kinematics.walking import WALK_STEP_NORM_FRACTION, step_along
+from ...solving.gauss_newton import Residual, descend
 from ...tolerances import (
     HIDDEN_ROBOT_RESIDUAL_TOL,
     PSEUDOINVERSE_CUTOFF_FRACTION,
@@ -25,6 +24,9 @@ from ...tolerances import (
     SINGULAR_POSE_RESIDUAL_TOL,
     SLOPE_STEP_MAX,
 )
+
+RANK_DESCENTS, RANK_STEPS = 6, 40
+"""Poses from which the smallest singular value is minimised, and steps of each."""
 
 
 def descend_to_rank_loss(start: ClosedConfiguration, observation_model: ObservationModel) -> ClosedConfiguration | None:

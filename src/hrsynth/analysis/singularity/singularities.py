@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Literal, NamedTuple
 
-from ...budgets import SINGULAR_NEIGHBOUR_STEP_M
 from ...constraints.condition import Condition, describe_permanent_loss
 from ...constraints.excluded_poses import describe_excluded_poses
 from ...constraints.pattern import ConstraintPattern
@@ -24,9 +23,13 @@ from ...tolerances import CLOSURE_SOLVER_TOL
 from ..analysis_declaration import analysis
 from ..freedoms import Freedom, name_freedoms
 from ..measured import MeasuredRobot
-from ..observed import POINTS, CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SensorLike
+from ..observation_inputs import POINTS, CameraLike, LegsLike, Seed, SensorLike
+from ..observed import ObservedRobot, RobotLike
 from ..verdict import Verdict
 from .condition_check import Agreement, compare_condition, compute_smallest_value
+
+SINGULAR_NEIGHBOUR_STEP_M = 0.01
+"""Distance of the neighbours of a singular pose (m)."""
 
 CONDITION_RANDOM_POSES_COUNT = 10_000
 """Random poses at which words, expression and rank are compared."""
