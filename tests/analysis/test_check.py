@@ -57,6 +57,21 @@ def check_identities(found: ConfigurationReport) -> None:
         assert c.is_type3 == (c.is_type1 and c.is_type2)
 
 
+@pytest.mark.parametrize("angle", [0.0, 0.4])
+@pytest.mark.parametrize("before", [("1 0 0", "0 0 1"), ("0 1 0", "0 0 1"), ("0 0 1",)])
+def test_a_pose_may_have_fewer_dof_than_are_generically_unobserved(before: tuple[str, ...], angle: float):
+    """Slides, a turn about z, a slide along its x: the turn and the slide after it are not observed."""
+    joints = [*(f'type="slide" axis="{axis}"' for axis in before), 'axis="0 0 1"', 'type="slide" axis="1 0 0"']
+    bodies = "".join(f'<body name="b{k}"><geom size=".1"/><joint name="j{k}" {each}/>' for k, each in enumerate(joints))
+    text = f"<mujoco><worldbody>{bodies}{'</body>' * len(joints)}</worldbody></mujoco>"
+    robot = load(text, platform=f"b{len(joints) - 1}")
+    (found,) = check(robot, at=f"joints:j{len(before)}={angle}").postures
+    slides = np.array([[float(v) for v in axis.split()] for axis in before] + [[np.cos(angle), np.sin(angle), 0.0]])
+    assert found.dof == np.linalg.matrix_rank(slides) + 1
+    check_identities(found)
+    assert found.hidden.type2 is False
+
+
 def motor_rates(oracle: Oracle, state: Array, velocities: Array) -> Array:
     """The rates of the R and P motors that the links' twists make, lengths in characteristic lengths."""
     rows = []

@@ -15,7 +15,7 @@ from hrsynth.analysis import instances
 from hrsynth.analysis.exact import IDENTITY_INSTANCES_COUNT, ExactArchitecture, build_architecture, get_architecture
 from hrsynth.analysis.instances import Instance, build_instance, compute_float_ranks, draw
 from hrsynth.analysis.loop_invariants import bound_degree, find_invariant_incidences
-from hrsynth.analysis.observed import ObservedRobot, select_relation
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.verdict import CONTROLLABLE, PARTIAL
 from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.geometry import build_mechanism as built
@@ -227,7 +227,7 @@ def pod(request: pytest.FixtureRequest) -> ObservedRobot:
 def test_a_mixture_of_operation_modes_proves_nothing(pod: ObservedRobot) -> None:
     generic = get_architecture(pod)
     verdict = generic.verdict(pod.segments[1:3])
-    ranks = {select_relation(m.relation, (1, 2)).rank for m in pod.all_samples.members}
+    ranks = {m.relation.select((1, 2)).rank for m in pod.all_samples.members}
     assert verdict.verdict in ((PARTIAL,) if ranks == {2} else (PARTIAL, None))
     if verdict.verdict is None:
         assert "operation modes" in verdict.reason

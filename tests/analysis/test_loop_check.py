@@ -93,7 +93,10 @@ def test_the_mobility_of_an_open_tree_is_the_sum_of_its_freedoms(branches: int, 
     assert (found.mobility.total, found.constraints.rows, found.redundant) == (branches * long, 0, ())
     assert "none, an open tree" in hrsynth.text(found)
     motors = ",".join(f"j{branch}_{k}" for branch in range(branches) for k in range(long))
-    assert found.more[-1] == f"no joint has a motor: try --motors {motors} (all joints: no loop is closed)"
+    wanted = f"no joint has a motor: try --motors {motors} (all joints: no loop is closed)"
+    if branches * long > 12:
+        wanted = f"no joint has a motor, and {branches * long} move independently: close the loops first (--close A:B)"
+    assert found.more[-1] == wanted
 
 
 @pytest.mark.parametrize("legs", [2, 3])

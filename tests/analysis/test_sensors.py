@@ -11,7 +11,7 @@ import pytest
 from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.derive import Derivation, derive
 from hrsynth.analysis.exact import get_architecture
-from hrsynth.analysis.observed import ObservedRobot, restrict_samples
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.verdict import compute_verdict
 from hrsynth.description import list_robots, load, native
 from hrsynth.errors import BadRequest, UndecidedRank, UndefinedValue
@@ -132,7 +132,7 @@ def test_exact_ranks_are_those_of_samples(robot: str, kind: str) -> None:
             continue
         assert found.exact, found.reason
         try:
-            samples = restrict_samples(setup.all_samples, observed)
+            samples = setup.all_samples.restrict(observed)
             assert found.rank == compute_verdict(setup, [o.leg for o in observed], samples).rank
         except UndecidedRank:  # a circle far away hardly shows how it is turned
             assert (kind, found.rank) == ("image_circle", min(5 * len(observed), found.dof))

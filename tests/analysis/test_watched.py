@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from hrsynth import check, derive, legs, select
+from hrsynth.analysis.configuration_report import ConfigurationAnalysis
+from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load
 from hrsynth.geometry.so3 import convert_vectors_to_rotations
@@ -28,9 +30,10 @@ WHY = {
 @pytest.mark.parametrize("name", WHY)
 def test_the_watched_axis_is_told_with_its_reason(name: str):
     found = check(name)
-    for (seen, why), record in zip(found.setup.observed_axes(), found.to_dict()["observations"], strict=True):
+    for seen, record in zip(found.setup.observed, found.to_dict()["observations"], strict=True):
+        why = record["reason"]
         assert why.startswith(WHY[name])
-        assert (record["leg"], record["link"], record["reason"]) == (seen.leg, seen.link, why)
+        assert (record["leg"], record["link"]) == (seen.leg, seen.link)
         assert isinstance(seen, Direction)
         assert np.allclose(record["axis"], seen.direction)
         assert f"{seen.link} along (" in str(found)
@@ -39,7 +42,7 @@ def test_the_watched_axis_is_told_with_its_reason(name: str):
 
 def test_sets_of_links_that_are_asked_for():
     found = legs("delta", observe="arm_1,rod_2a")
-    assert [why for _, why in found.setup.observed_axes()] == ["requested", WHY["quattro"]]
+    assert [each["reason"] for each in found.to_dict()["observations"]] == ["requested", WHY["quattro"]]
     assert [each.legs for each in found.sets] == [("1",), ("2",), ("1", "2")]
     single = [check("delta", observe=link).postures[0].hidden.rank for link in ("arm_1", "rod_2a")]
     assert [each.rank for each in found.sets[:2]] == single
@@ -93,9 +96,27 @@ def test_half_a_turn_is_printed_as_a_positive_one():
         turned = np.eye(4)
         turned[:3, :3] = convert_vectors_to_rotations(np.array([0.0, 0.0, angle]))
         assert str(Pose.of(turned)) == "x=0,y=0,z=0,rpy=0/0/3.141593"
-        motion = ObservedRobot.of("3rrr_m1").telling([Pose.parse("phi=10deg")]).motion
+        motion = ObservedRobot.of("3rrr_m1").printing_like([Pose.parse("phi=10deg")]).motion
         assert str(motion.pose(turned @ motion.home)).endswith("phi=180deg")
     assert Pose.parse("phi=-180deg").phi == -math.pi
+
+
+def test_the_format_of_poses_is_no_part_of_a_robot():
+    """Equal setups print poses as they were typed, also from cached results."""
+    robot = ObservedRobot.of("gough_stewart")
+    other = robot.printing_like([Pose.parse("rpy=5deg/0/0")])
+    assert robot is not other
+    assert (robot, hash(robot)) == (other, hash(other))
+    assert robot != ObservedRobot.of("gough_stewart", "1,2")
+    turned = Pose.parse("x=0,y=0,rpy=0.1/0.2/0").rotation
+    for text in ("rpy=0.1/0.2/0", "rpy=5.729578deg/11.459156deg/0") * 2:
+        (report,) = check(robot, at=f"x=0,y=0,{text}").postures
+        assert ("deg" in str(report.pose)) is ("deg" in text)
+        assert np.allclose(report.pose.rotation, turned, atol=1e-6)
+    for setup, is_in_degrees in ((robot, False), (other, True)) * 2:
+        report = ConfigurationAnalysis.of(setup).classify(setup.all_samples.start)
+        measured = MeasuredRobot.of(setup).setup
+        assert ("deg" in str(report.pose)) is measured.form.degrees is is_in_degrees
 
 
 def with_connectors(skew: float, short: float, seed: int) -> str:

@@ -23,21 +23,15 @@ from ..options import OBSERVATION, option, parse_plain_number
 from ..progress import report
 from ..records import FLAT, GAP, OPTIONAL, As, Recorded, Shown, Word, recorded
 from ..results import Result, Value
-from ..tolerances import COST_DIFFERENCE_TOL, RANK_CUTOFF_FRACTION, RELATION_ANGLE_TOL
+from ..tolerances import RANK_CUTOFF_FRACTION, RELATION_ANGLE_TOL
 from .analysis_declaration import analysis
 from .freedoms import Freedom
-from .observed import (
-    CameraLike,
-    LegsLike,
-    ObservedRobot,
-    RobotLike,
-    Seed,
-    SensorLike,
-    normalise_texts,
-    read_robot,
-    restrict_samples,
-)
+from .observation_inputs import CameraLike, LegsLike, Seed, SensorLike, normalise_texts
+from .observed import ObservedRobot, RobotLike, read_robot
 from .verdict import AT_REST, CONTROLLABLE, Verdict, compute_verdict
+
+COST_DIFFERENCE_TOL = 1e-9
+"""Relative difference below which two costs are equal."""
 
 AXES = {JointType.UNIVERSAL: ("first", "second"), JointType.CYLINDRICAL: ("slide", "turn")}
 """The names of the coordinates of joints that have two."""
@@ -274,8 +268,8 @@ def advise(
     cost: Annotated[
         str,
         option(
-            "Costs by kind, such as encoder=0.5,point=3 (default: 1 each); the cheapest sets are "
-            "searched. Kinds: leg, direction, line, encoder and those of --candidate-sensor.",
+            "Cost of one observation of each kind, such as encoder=0.5,point=3 (default: 1); sets of the lowest total "
+            "cost are suggested. Kinds: leg, direction, line, encoder and those of --candidate-sensor.",
             "KIND=NUMBER",
         ),
     ] = "",
@@ -333,7 +327,7 @@ def advise(
     if now.verdict in (CONTROLLABLE, AT_REST):
         return Advice(setup, now, (), 0, True)
     all_samples = list_candidates(setup, offered)
-    samples = setup.measuring((*setup.observed, *(each.observation for each in all_samples)))
+    samples = setup.all_samples.measure((*setup.observed, *(each.observation for each in all_samples)))
     search = Search(samples, len(setup.observed), all_samples)
     costs = [prices.get(_name_kind(each), 1.0) for each in search.useful]
     chosen, complete = search.cheapest(costs)
@@ -381,7 +375,7 @@ def _verify(
     for added, cost in sets:
         watched = (*setup.observed, *(each.observation for each in added))
         try:
-            verdict = compute_verdict(setup, setup.labels, restrict_samples(samples, watched, ways=False))
+            verdict = compute_verdict(setup, setup.labels, samples.restrict(watched, ways=False))
             found.append(SensorSuggestion(added, verdict, cost))
         except UndecidedRank:
             continue

@@ -31,21 +31,10 @@ from ..results import Result, Value
 from ..tolerances import RANK_GAP_MIN
 from .analysis_declaration import analysis
 from .configuration_report import ConfigurationAnalysis, ConfigurationReport
-from .observed import (
-    POINTS,
-    POSES,
-    UNLIMITED,
-    CameraLike,
-    LegsLike,
-    Mobility,
-    MobilityWritten,
-    ObservedAxis,
-    ObservedRobot,
-    RobotLike,
-    Seed,
-    SensorLike,
-)
+from .observation_inputs import POINTS, POSES, CameraLike, LegsLike, Seed, SensorLike
+from .observed import Mobility, ObservedRobot, RobotLike
 from .pose_requests import require_platform, solve_requested_poses
+from .setup_records import LIMITS_IGNORED, MOBILITY, OBSERVATIONS, compute_mobility_as_written
 from .singularity_indices import Redundancy, find_generic_rows, list_redundant
 
 UNREACHABLE = "unreachable"
@@ -127,13 +116,15 @@ class Check(Result, shown_as="check"):
     @property
     def as_written(self) -> Mobility | None:
         """The mobility of the file's own links and joints, None where no samples of them can be drawn."""
-        return self.setup.mobility_if_written
+        return compute_mobility_as_written(self.setup)
 
     def require_answered(self, at: Any = None, **asked: Any) -> None:
         """Raise ``UndecidedRank`` or ``PoseReachFailure`` for requested poses."""
         for posture in self.postures if at else ():
             if not posture.has_decided_ranks:
-                raise UndecidedRank(f"{self.setup.robot.name} at {posture.pose}", posture.gap, RANK_GAP_MIN)
+                raise UndecidedRank(
+                    f"{self.setup.robot.name} at {posture.pose}", posture.gap, RANK_GAP_MIN, "Choose another pose."
+                )
         if self.unreached:
             raise PoseReachFailure.of_all(self.unreached)
 
@@ -153,9 +144,9 @@ class Check(Result, shown_as="check"):
         lambda self: [UnreachedPose(each.pose, each.reason) for each in self.unreached],
         As("unreached"),
     )
-    observations = Shown(list[ObservedAxis], lambda self: self.setup.observed_record)
-    mobility = Shown(MobilityWritten, lambda self: self.setup.mobilities)
-    limits_ignored = Shown(list[str], lambda self: self.setup.limits_ignored, UNLIMITED)
+    observations = OBSERVATIONS
+    mobility = MOBILITY
+    limits_ignored = LIMITS_IGNORED
 
 
 class LoopMobility(NamedTuple):
@@ -305,7 +296,7 @@ def check(
     poses = parse_poses(at)
     cells = None if grid is None else Grid.parse(grid)
     try:
-        setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed).telling(poses)
+        setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed).printing_like(poses)
     except (NoPlatform, NoSegment, BadMechanism, SamplingFailure) as error:
         if (
             not isinstance(robot, Mechanism)

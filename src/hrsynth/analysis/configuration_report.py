@@ -8,16 +8,16 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from ..budgets import CACHED_OBSERVED_ROBOTS_COUNT
 from ..geometry.vectors import Array
+from ..kinematics.branch_tests import rank_rotations
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.joint_coordinates import OfConfiguration
 from ..kinematics.limits import find_flat_tilts, list_joints_beyond
 from ..kinematics.velocity_relation import VelocityRelation, compute_relation, compute_relation_of_rows
-from ..mechanism.pose import Pose
+from ..mechanism.pose import Pose, PoseForm
 from ..records import OPTIONAL, As, Number, Record, Recorded, Shown, recorded
 from ..results import Value
-from ..tolerances import RANK_GAP_MIN, WAYPOINT_RESIDUAL_TOL
+from ..tolerances import CACHED_OBSERVED_ROBOTS_COUNT, RANK_GAP_MIN, WAYPOINT_RESIDUAL_TOL
 from .formation import Formation, analyze_formation, describe_degeneracy
 from .freedoms import Freedom, name_freedoms
 from .observed import Mobility, ObservedRobot
@@ -106,6 +106,8 @@ class ConfigurationReport(OfConfiguration, Value):
     """Loop constraints that are redundant only here."""
     formation: Annotated[Formation | None, Formation, OPTIONAL] = None
     """For a formation: unobserved motions here; ``pose`` is that of its first link."""
+    turns: int = 0
+    """Rank of the platform's angular velocities."""
 
     rank = Shown(int, lambda self: self.hidden.rank)
     condition = Shown(Number, lambda self: self.distances.condition)
@@ -153,10 +155,9 @@ class ConfigurationAnalysis(Value):
     setup: ObservedRobot
 
     @classmethod
-    @lru_cache(maxsize=CACHED_OBSERVED_ROBOTS_COUNT)
     def of(cls, setup: ObservedRobot) -> ConfigurationAnalysis:
-        """The one of an observed robot: its generic values are computed once."""
-        return cls(setup)
+        """Return the analysis of an observed robot: its generic values are computed once."""
+        return _build_analysis(setup, setup.form)
 
     @cached_property
     def usual(self) -> Counts:
@@ -187,7 +188,9 @@ class ConfigurationAnalysis(Value):
         """Report without names: no dof, no redundant constraints."""
         setup = self.setup
         found = compute_relation(at, setup.samples.observation_model)
-        told = compute_relation(at, replace(setup.all_samples.observation_model, observations=setup.telling_idle))
+        told = compute_relation(
+            at, replace(setup.all_samples.observation_model, observations=setup.internal_motion_invariants)
+        )
         real = self._kinds(self._real(at), self.usual_real) if at.model.actuated_indices() else None
         mobility = Mobility(found.mobility, found.mobility - told.dimension)
         return ConfigurationReport(
@@ -198,6 +201,7 @@ class ConfigurationAnalysis(Value):
             self._kinds(found, self.usual),
             real,
             self._distances(at, found),
+            turns=rank_rotations(found)[0],
         )
 
     def examine(self, at: ClosedConfiguration) -> ConfigurationReport:
@@ -239,7 +243,7 @@ class ConfigurationAnalysis(Value):
         if M is None or self.usual.unexplained:
             reached = None if self.usual.unexplained else 0.0
             return SingularityDistances(None, reached, constraints, None, None, None)
-        rank = found.dof.value - self.usual.unseen
+        rank = max(0, found.dof.value - self.usual.unseen)  # a platform may have fewer dof here than are unseen
         _, values, right = np.linalg.svd(M, full_matrices=False)
         largest = float(values[0]) if rank else 0.0
         if not rank or found.rank < rank:
@@ -277,3 +281,9 @@ class ConfigurationAnalysis(Value):
         )
         position = None if at_zero else at.pose(self.setup.motion.link)[:3, 3]
         return name_freedoms(twists, setup.decomposition, setup.labels, position)
+
+
+@lru_cache(maxsize=CACHED_OBSERVED_ROBOTS_COUNT)
+def _build_analysis(setup: ObservedRobot, form: PoseForm) -> ConfigurationAnalysis:
+    """Return one value for equal setups that print poses in one ``form``."""
+    return ConfigurationAnalysis(setup)

@@ -12,24 +12,14 @@ from ..kinematics.sampling import Samples
 from ..mechanism.observation import list_labels
 from ..mechanism.pose import parse_pose
 from ..progress import report
-from ..records import FLAT, As, Recorded, Shown, recorded
+from ..records import FLAT, As, Recorded, recorded
 from ..results import Result
 from .analysis_declaration import analysis
 from .exact import ExactVerdict, get_architecture
-from .observed import (
-    BeginPose,
-    CameraLike,
-    LegsLike,
-    ObservedAxis,
-    ObservedRobot,
-    OperationModeRecord,
-    OtherMode,
-    RobotLike,
-    Seed,
-    SensorLike,
-    restrict_samples,
-)
+from .observation_inputs import BeginPose, CameraLike, LegsLike, Seed, SensorLike
+from .observed import ObservedRobot, RobotLike
 from .pose_requests import observe as observed
+from .setup_records import OBSERVATIONS, OPERATION_MODE, OTHER_MODES
 from .verdict import Verdict, compute_verdict
 
 ALL_LEG_SETS_LEGS_MAX = 10
@@ -103,9 +93,9 @@ class Legs(Result, shown_as="legs"):
         """Sets, each with its verdict for generic geometry of the same architecture."""
         return [LegSet(each, exact.exact, exact) for each, exact in zip(self.sets, self.exact, strict=True)]
 
-    observations = Shown(list[ObservedAxis], lambda self: self.setup.observed_record)
-    operation_mode = Shown(OperationModeRecord, lambda self: self.setup.operation_mode)
-    other_modes = Shown(list[OtherMode], lambda self: self.setup.other_modes)
+    observations = OBSERVATIONS
+    operation_mode = OPERATION_MODE
+    other_modes = OTHER_MODES
 
 
 def _find_smallest_sets(
@@ -206,7 +196,7 @@ def legs(
     few = 1 if formation else 3
 
     def samples_of(chosen: tuple[str, ...]) -> Samples:
-        return restrict_samples(setup.all_samples, [each for each in segments if each.leg in chosen], ways=False)
+        return setup.all_samples.restrict([each for each in segments if each.leg in chosen], ways=False)
 
     def rank(chosen: tuple[str, ...]) -> int:
         return max(member.relation.rank for member in samples_of(chosen).members)

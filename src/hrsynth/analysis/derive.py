@@ -31,21 +31,10 @@ from .analysis_declaration import analysis
 from .exact import ExactVerdict
 from .exact import get_architecture as exact_architecture
 from .freedoms import Freedom, name_freedoms
-from .observed import (
-    POINTS,
-    BeginPose,
-    CameraLike,
-    LegsLike,
-    Mobility,
-    MobilityWritten,
-    ObservedRobot,
-    OperationModeRecord,
-    OtherMode,
-    RobotLike,
-    Seed,
-    SensorLike,
-)
+from .observation_inputs import POINTS, BeginPose, CameraLike, LegsLike, Seed, SensorLike
+from .observed import Mobility, ObservedRobot, RobotLike
 from .pose_requests import observe as observed_robot
+from .setup_records import MOBILITY, OPERATION_MODE, OTHER_MODES
 from .verdict import Verdict, compute_verdict
 
 if TYPE_CHECKING:
@@ -172,10 +161,10 @@ class Derivation(Result, shown_as="derive"):
         return Notation(real.unicode, hidden.unicode, real.ascii, hidden.ascii, hidden.latex)
 
     verdict_record = Shown(Verdict, lambda self: self.verdict, As(flat=True, without=("legs", "gap")))
-    mobility_record = Shown(MobilityWritten, lambda self: self.setup.mobilities, As("mobility"))
+    mobility_record = MOBILITY
     point_platform = Shown(bool, lambda self: self.setup.decomposition.point is not None)
-    operation_mode = Shown(OperationModeRecord, lambda self: self.setup.operation_mode)
-    other_modes = Shown(list[OtherMode], lambda self: self.setup.other_modes)
+    operation_mode = OPERATION_MODE
+    other_modes = OTHER_MODES
 
 
 @analysis(

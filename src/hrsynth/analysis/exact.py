@@ -27,7 +27,6 @@ from typing import Annotated
 import numpy as np
 
 from ..batch.platform_coordinates import collect_frames
-from ..budgets import CACHED_OBSERVED_ROBOTS_COUNT, LARGEST_RANDOM
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.velocity_relation import ObservationModel, VelocityRelation
 from ..mechanism import Mechanism, Observation
@@ -38,10 +37,11 @@ from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.structural_incidences import GeometricIncidence, find_structural_incidences, list_incidences
 from ..records import OPTIONAL, As, Record, Recorded, Word
 from ..results import ComparableValue, drop_infinite
-from ..tolerances import CLOSURE_RESIDUAL_TOL
+from ..tolerances import CACHED_OBSERVED_ROBOTS_COUNT, CLOSURE_RESIDUAL_TOL
 from .formation import SENSED_POINTS_COUNT, evaluate_formation_rows, measure_links
 from .formation import name_rigidity as formation_word
 from .instances import (
+    LARGEST_RANDOM,
     Instance,
     RecognitionFailure,
     build_instance,
@@ -52,7 +52,7 @@ from .instances import (
     rank,
 )
 from .loop_invariants import bound_degree, find_invariant_incidences
-from .observed import ObservedRobot, select_relation
+from .observed import ObservedRobot
 from .sensor_rows import WRENCH_DEGREE_MAX, SensorPlaces, has_exact_rates
 from .verdict import name_controllability
 
@@ -303,10 +303,10 @@ class ExactArchitecture:
             raise RecognitionFailure(
                 f"the observation of link {odd.link} is not a direction and not requested"
                 if has_exact_rates(odd)
-                else f"the measured value of {odd.kind} {odd.leg} is not rational"
+                else f"the measured value of {odd.text} is not rational"
             )
         places = [self._places[o.key] for o in observed]
-        dimension = select_relation(self.relation, places).dimension
+        dimension = self.relation.select(places).dimension
         best = 0
         for number in range(EXACT_RANK_INSTANCES_COUNT):
             together, rates = self.instance(number).ranks(places)
@@ -337,9 +337,7 @@ def build_architecture(
     sensors = SensorPlaces.of(observed, mechanism)
     directions = [*(o for o in observed if isinstance(o, SeenAxis)), *sensors.as_observed()]
     relations = recognise(mechanism, collect_frames(at), directions, observation_model.point, sensors.points)
-    return ExactArchitecture(
-        mechanism, relations, observed, select_relation(relation, places), at[0].kernel()[0].shape[1]
-    )
+    return ExactArchitecture(mechanism, relations, observed, relation.select(places), at[0].kernel()[0].shape[1])
 
 
 def round_up_power(chance: float) -> str:

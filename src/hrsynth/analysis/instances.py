@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..budgets import LARGEST_RANDOM
 from ..geometry.incidences import Incidence
 from ..geometry.ranks import rank_of
 from ..geometry.screws import find_normals
@@ -30,6 +29,9 @@ from .sensor_rows import SensorPlaces, build_view_geometry, compute_observation_
 
 if TYPE_CHECKING:
     from flint import fmpz_mat
+
+LARGEST_RANDOM = 10**9
+"""Range of random integers of rational instances, of either sign."""
 
 
 class RecognitionFailure(Exception):

@@ -6,7 +6,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
-from ..budgets import CACHED_OBSERVED_ROBOTS_COUNT
 from ..constraints.condition import Condition, derive_condition
 from ..constraints.excluded_poses import describe_excluded_poses
 from ..constraints.pattern import ConstraintPattern, describe_platform_motion, recognise
@@ -14,8 +13,11 @@ from ..geometry.vectors import Array
 from ..kinematics.sampling import Samples
 from ..kinematics.velocity_relation import ObservationModel
 from ..mechanism.observation import list_labels
+from ..mechanism.pose import PoseForm
 from ..results import Value
-from .observed import ObservedRobot, build_motor_model
+from ..tolerances import CACHED_OBSERVED_ROBOTS_COUNT
+from .observation_choice import list_encoders
+from .observed import ObservedRobot
 from .verdict import Verdict, compute_verdict
 
 
@@ -27,21 +29,10 @@ class MeasuredRobot(Value):
     samples: Samples
 
     @classmethod
-    @lru_cache(maxsize=CACHED_OBSERVED_ROBOTS_COUNT)
-    def of_directions(cls, setup: ObservedRobot) -> MeasuredRobot:
-        """The observed directions: the hidden robot."""
-        return cls(setup, setup.samples)
-
-    @classmethod
-    @lru_cache(maxsize=CACHED_OBSERVED_ROBOTS_COUNT)
-    def of_motors(cls, setup: ObservedRobot) -> MeasuredRobot:
-        """The motors' coordinates: the real robot. Raises ``BadRequest`` where it has no motor."""
-        return cls(setup, setup.measuring(build_motor_model(setup).observations))
-
-    @classmethod
-    def of(cls, setup: ObservedRobot, real: bool) -> MeasuredRobot:
-        """The ``real`` robot or the hidden one."""
-        return cls.of_motors(setup) if real else cls.of_directions(setup)
+    def of(cls, setup: ObservedRobot, real: bool = False) -> MeasuredRobot:
+        """Return the hidden robot, whose measured values are the observations, or the ``real`` robot, whose are the
+        motors' coordinates; raises ``BadRequest`` for a real robot without motors."""
+        return _measure(setup, real, setup.form)
 
     @property
     def observation_model(self) -> ObservationModel:
@@ -86,3 +77,11 @@ class MeasuredRobot(Value):
         return describe_excluded_poses(
             self.setup.decomposition, self.pattern, self.condition, self.setup.configurations
         )
+
+
+@lru_cache(maxsize=CACHED_OBSERVED_ROBOTS_COUNT)
+def _measure(setup: ObservedRobot, real: bool, form: PoseForm) -> MeasuredRobot:
+    """Return one value for equal setups that print poses in one ``form``."""
+    if real:
+        return MeasuredRobot(setup, setup.all_samples.measure(list_encoders(setup.decomposition)))
+    return MeasuredRobot(setup, setup.samples)

@@ -16,7 +16,8 @@ from ..mechanism.pose import AskedPose, PoseLike, parse_poses
 from ..processes import run_shared
 from ..progress import report
 from ..results import Result, shorten_value
-from .observed import LegsLike, RobotLike, normalise_names, read_robot
+from .observation_inputs import LegsLike, normalise_names
+from .observed import RobotLike, read_robot
 
 PARTS_PER_PROCESS_MIN = 2
 """Minimum number of work items per process, if there are so many."""

@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING
 from ..batch.pose_continuation import track_to_pose
 from ..errors import BadRequest, HrsynthError, PoseReachFailure
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.joint_coordinates import track_to_joints
 from ..kinematics.locked_twists import set_zero
 from ..mechanism.model import Mechanism
 from ..mechanism.pose import AskedPose, JointPose, ModeNumber, Pose, PoseLike, parse_pose
 from ..options import require_range
 from ..results import with_spelling
 from ..tolerances import PRINTED_POSE_TOL
-from .observed import GENERIC_SAMPLES_COUNT, CameraLike, LegsLike, ObservedRobot, RobotLike, SensorLike, read_robot
+from .branch.joint_line import follow_line
+from .observation_inputs import CameraLike, LegsLike, SensorLike
+from .observed import GENERIC_SAMPLES_COUNT, ObservedRobot, RobotLike, read_robot
 
 if TYPE_CHECKING:
     from .modes.modes import AssemblyModes
@@ -154,7 +155,7 @@ def solve_requested_poses(
         if not isinstance(each, ModeNumber):
             try:
                 if isinstance(each, JointPose):
-                    found[each] = track_to_joints(all_samples.start, motion, each)
+                    found[each] = follow_line(all_samples.start, motion, each)
                 else:
                     found[each] = track_to_pose(all_samples.start, all_samples.observation_model, each, motion)
             except PoseReachFailure as error:

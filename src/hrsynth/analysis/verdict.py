@@ -9,7 +9,7 @@ from typing import Annotated, NamedTuple
 from ..errors import UndecidedRank
 from ..geometry.ranks import Rank
 from ..kinematics.sampling import Samples
-from ..kinematics.velocity_relation import VelocityRelation, compute_relation, look
+from ..kinematics.velocity_relation import VelocityRelation, compute_relation, decompose_relations
 from ..records import GAP, OPTIONAL, Recorded, Shown, Word, recorded
 from ..results import Result
 from ..tolerances import NONZERO_SINGULAR_VALUE_MIN, RANK_CUTOFF_FRACTION, RANK_GAP_MIN, ZERO_SINGULAR_VALUE_MAX
@@ -101,7 +101,7 @@ def compute_verdict(setup: ObservedRobot, legs: Sequence[str], samples: Samples)
     a sample, or between what counts at one sample and what does not at another.
     """
     found = [member.relation for member in samples.members]
-    look(found)
+    decompose_relations(found)
     rank = max(each.rank for each in found)
     what = f"the rank of legs {', '.join(legs)}"
     if any(each.rank != rank for each in found):
