@@ -24,7 +24,6 @@ import numpy as np
 
 from hrsynth.analysis.aspects.path import PathPlanner
 from hrsynth.analysis.aspects.verdicts import SEPARATED
-from hrsynth.budgets import RUN_ESCAPE_DISTANCE_MAX
 from hrsynth.description import load
 from hrsynth.geometry.vectors import convert_rpy_to_rotation, hat
 from hrsynth.kinematics.configuration import ClosedConfiguration
@@ -34,6 +33,7 @@ from hrsynth.mechanism.model import Mechanism
 from hrsynth.simulation.law import FixedDirections, Law, directions
 from hrsynth.simulation.outcome import ANTIPODAL, BOUNDARY, ENDINGS, GOAL, MINIMUM, MODE
 from hrsynth.simulation.result import Servo
+from hrsynth.simulation.run import RUN_ESCAPE_DISTANCE_MAX
 from hrsynth.simulation.servo import Conditions, ServoTask
 from kinematics.robots import state_of
 from oracle import Oracle

@@ -14,19 +14,27 @@ import numpy as np
 
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.verdict import CONTROLLABLE, compute_verdict
-from hrsynth.budgets import EQUILIBRIUM_COORDINATE_MAX, EQUILIBRIUM_START_STEPS_MAX
 from hrsynth.constraints.pattern import list_leg_ends
+from hrsynth.equations.measured_error import DirectionTerm, ErrorSystem
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.simulation.equilibria.descent import DESCENT_STEP_MAX, CriticalPoint, Expansion, are_closed, walk_at_random
+from hrsynth.simulation.equilibria.descent import (
+    CRITICAL_CURVATURE_TOL,
+    DESCENT_STEP_MAX,
+    EQUILIBRIUM_COORDINATE_MAX,
+    EQUILIBRIUM_START_STEPS_MAX,
+    CriticalPoint,
+    Expansion,
+    are_closed,
+    walk_at_random,
+)
+from hrsynth.simulation.equilibria.descent import CRITICAL_GRADIENT_TOL as AT_ZERO
 from hrsynth.simulation.equilibria.equilibria import MODE_WALK_FIRST_STEP_FRACTION, EquilibriumSearch
 from hrsynth.simulation.equilibria.equilibrium import CRITICAL, Equilibrium
-from hrsynth.simulation.equilibria.error import DirectionTerm, ErrorSystem
 from hrsynth.simulation.equilibria.search import CountedCriticalPoint, in_mode, marks, starts
 from hrsynth.simulation.outcome import ANTIPODAL, BOUNDARY, GOAL, MINIMUM, MODE
 from hrsynth.simulation.result import Servo
-from hrsynth.tolerances import CRITICAL_CURVATURE_TOL, CRITICAL_POINT_DISTANCE_TOL
-from hrsynth.tolerances import CRITICAL_GRADIENT_TOL as AT_ZERO
+from hrsynth.tolerances import CRITICAL_POINT_DISTANCE_TOL
 from simulation.scenes import Legs, setting
 
 SINGULAR, CONTINUUM, APART, OUTSIDE = "singular", "family", "apart", "outside"

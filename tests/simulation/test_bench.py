@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from os import environ
-
 import numpy as np
 import pytest
 
@@ -17,7 +15,6 @@ from hrsynth.simulation.run import Loop
 from hrsynth.simulation.servo import servo
 from simulation.scenes import CONTROLLABLE, few_first, regular, setting
 
-environ.setdefault("MUJOCO_GL", "egl")
 mujoco = pytest.importorskip("mujoco")
 
 

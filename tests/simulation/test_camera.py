@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
 from importlib.util import find_spec
 
 import numpy as np
@@ -150,12 +153,28 @@ def test_without_opencv_pictures_are_refused_in_one_line(monkeypatch: pytest.Mon
     assert raised.value.exit_status == 3
 
 
+@pytest.mark.skipif(find_spec("mujoco") is None or sys.platform != "linux", reason="needs the extra bench on Linux")
+@pytest.mark.parametrize("first", ["import mujoco", ""])
+def test_without_a_screen_images_are_rendered_or_refused(first: str):
+    """MuJoCo chooses at its first import what it draws with; with GLFW and no screen it ends the process."""
+    code = f"""{first}
+from hrsynth.errors import RenderFailure
+from hrsynth.simulation.rendered_images import drawing
+try:
+    print(drawing().GLContext.__module__)
+except RenderFailure as error:
+    print(error)
+"""
+    environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL")}
+    run = subprocess.run([sys.executable, "-W", "ignore", "-c", code], env=environment, capture_output=True, text=True)
+    assert ("there is no screen" if first else "mujoco.egl") in run.stdout
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(find_spec("mujoco") is None, reason="needs the extra bench")
 @pytest.mark.parametrize("name", ["delta", "quattro"])
 def test_directions_from_rendered_pictures(name: str):
     pytest.importorskip("cv2")
-    rendered_images.drawing()
     scene = home(name)
     mechanism, observation_model = scene.setup.mechanism, scene.law.observation_model
     rods = cylinders(mechanism, observation_model.observations)

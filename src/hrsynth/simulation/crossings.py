@@ -94,11 +94,6 @@ class _Mark:
             [*(np.linalg.svd(each, compute_uv=False)[-1] for each in (self.rates, self.twists)), self.weakest]
         )
 
-    @property
-    def is_clear(self) -> bool:
-        """Return True if no map is singular, so that the sides can be compared."""
-        return bool(np.all(self.least > CONTROLLER_DAMPING_MIN))
-
     def smallest(self, dof: int) -> float:
         """Smallest singular value of Mᵀ."""
         left, values, _ = np.linalg.svd(self.twists, full_matrices=False)
@@ -130,7 +125,8 @@ def track_run(
             turned = _turned_maps(marks[known[i]], marks[place])[i] * (1.0 if i == LOOP_MAP_INDEX else since[i])
             here[i], last[i] = here[i] * turned, place if turned < 0 else last[i]
             known[i], since[i] = place, 1.0
-        if marks[place].is_clear and np.any(here != before):
+        # where no map is singular, the sides can be compared
+        if np.all(marks[place].least > CONTROLLER_DAMPING_MIN) and np.any(here != before):
             rates, twists, loops = here != before
             if loops:
                 passages.append(RunCrossing(CONSTRAINT, int(last[2])))

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from ..analysis.observed import ObservedRobot, build_motor_model
-from ..errors import BadRequest, LoopClosureFailure, MissingExtra
+from ..description.simulator_models import load_mujoco
+from ..errors import BadRequest, LoopClosureFailure
 from ..geometry.ranks import compute_range_basis
 from ..geometry.vectors import Array
 from ..kinematics.chart import TangentChart
@@ -22,22 +23,17 @@ from ..kinematics.locked_twists import set_zero
 from ..kinematics.velocity_relation import compute_relation
 from ..mechanism import Mechanism
 from ..progress import report
-from ..tolerances import DYNAMICS_SETTLED_ERROR_TOL, DYNAMICS_STEADY_CHANGE_FRACTION
 from .law import Command, Measures, Poses
 from .mujoco_model import MUJOCO_STEP_S, coordinates, mockup
 from .run import OPEN, SERVED_AT, TIME, Loop, Run
 
+DYNAMICS_SETTLED_ERROR_TOL = 1e-6
+"""‖e‖ at which the dynamic simulation has settled."""
+DYNAMICS_STEADY_CHANGE_FRACTION = 1e-3
+"""Relative change of the error per time constant below which the dynamic simulation has settled."""
+
 CONTROL_PERIOD_S = 0.01
 """Seconds between two commands."""
-
-
-def simulator(what: str) -> Any:
-    """Return the module mujoco; raises ``MissingExtra`` if it is not installed."""
-    try:
-        import mujoco
-    except ImportError:
-        raise MissingExtra(what, "bench") from None
-    return mujoco
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +47,7 @@ class DynamicSimulation:
     def of(cls, setup: ObservedRobot, start: ClosedConfiguration) -> DynamicSimulation:
         """Build the dynamic simulation; raises ``MissingExtra``, and ``BadRequest`` if the motors do not determine the
         robot's motion."""
-        simulator("the dynamic simulation")
+        load_mujoco("the dynamic simulation")
         observation_model = build_motor_model(setup)
         if compute_relation(start, observation_model).unobserved_twists.shape[1]:
             raise BadRequest(
@@ -68,7 +64,7 @@ class DynamicSimulation:
 
     @cached_property
     def _model(self) -> Any:
-        return simulator("the dynamic simulation").MjModel.from_xml_string(mockup(self.mechanism))
+        return load_mujoco("the dynamic simulation").MjModel.from_xml_string(mockup(self.mechanism))
 
     @cached_property
     def _names(self) -> list[str]:
@@ -79,7 +75,7 @@ class DynamicSimulation:
     def run(self, loop: Loop, horizon: float) -> tuple[Run, Array]:
         """Run until the error is below ``DYNAMICS_SETTLED_ERROR_TOL`` or ``horizon`` (s); also the displacement of the
         platform since the start, as simulated, (4, 4)."""
-        mujoco = simulator("the dynamic simulation")
+        mujoco = load_mujoco("the dynamic simulation")
         model, data = self._model, mujoco.MjData(self._model)
         motors = [model.actuator(name).id for name in self._names]
         places = [int(model.joint(name).qposadr[0]) for name in self._names]

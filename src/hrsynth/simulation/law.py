@@ -18,7 +18,6 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ..budgets import POSE_VALUE_MAX
 from ..errors import BadRequest, PoseReachFailure
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration, measure
@@ -29,7 +28,7 @@ from ..mechanism.cameras import CameraObservation, make_depth_plane
 from ..mechanism.observations.direction import SeenAxis
 from ..options import option, parse_plain_number
 from ..results import Value
-from ..tolerances import CONTROLLER_DAMPING_MIN
+from ..tolerances import CONTROLLER_DAMPING_MIN, POSE_VALUE_MAX
 
 Measures = Sequence[Array] | Array
 """The values (size,) of each observation, lengths in characteristic lengths; of directions also as (k, 3)."""

@@ -85,7 +85,7 @@ def mockup(mechanism: Mechanism) -> str:
     for joint in loops:
         _loop(made, bodies, equality, joint)
     _drive(made, actuator, [joint for joint, _ in tree])
-    _gears(mechanism, equality, [joint for joint, _ in tree])
+    _gears(mechanism, equality)
     return Xml.tostring(root, encoding="unicode")
 
 
@@ -156,13 +156,10 @@ def _drive(made: MujocoModel, actuator: Xml.Element, tree: list[Joint]) -> None:
             Xml.SubElement(actuator, "velocity", name=name, joint=name, kv=f"{gain:.9g}")
 
 
-def _gears(mechanism: Mechanism, equality: Xml.Element, tree: list[Joint]) -> None:
+def _gears(mechanism: Mechanism, equality: Xml.Element) -> None:
     for coupling in mechanism.couplings:
-        names = [
-            next(j.name for j in tree if j.successor == link and j.in_tree and j.type.freedoms == 1)
-            for link in (coupling.successor, coupling.predecessor)
-        ]
-        Xml.SubElement(equality, "joint", STIFF, joint1=names[0], joint2=names[1], polycoef=f"0 {coupling.ratio} 0 0 0")
+        names = {"joint1": coupling.driven, "joint2": coupling.driver}
+        Xml.SubElement(equality, "joint", STIFF, **names, polycoef=f"0 {coupling.ratio} 0 0 0")
 
 
 def _body(parent: Xml.Element, name: str) -> Xml.Element:

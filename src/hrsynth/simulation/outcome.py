@@ -11,7 +11,6 @@ import numpy as np
 from ..analysis.configuration_report import ConfigurationAnalysis
 from ..analysis.modes.modes import AssemblyModes, modes
 from ..analysis.observed import ObservedRobot
-from ..budgets import RUN_EVALUATIONS_MAX
 from ..errors import HrsynthError
 from ..geometry.vectors import Array, compare_poses
 from ..kinematics.configuration import ClosedConfiguration
@@ -20,7 +19,7 @@ from ..records import As, Recorded
 from ..results import Value
 from ..tolerances import CONTROLLER_DAMPING_MIN, NEAR_MODE_DISTANCE_MAX, NEAR_POSE_DIFFERENCE_TOL, RELATION_ANGLE_TOL
 from .law import Command, Measures
-from .run import AWAY, EFFORT, LIMIT, LOST, OPEN, POISED, REST, SERVED_AT, UNMEASURED, UNSEEN, Run
+from .run import AWAY, EFFORT, LIMIT, LOST, OPEN, POISED, REST, RUN_EVALUATIONS_MAX, SERVED_AT, UNMEASURED, UNSEEN, Run
 
 GOAL, MODE, ANTIPODAL, MINIMUM = "goal", "assembly mode", "antipodal", "local minimum"
 BOUNDARY, SIGHT, TIME, UNDECIDED = "limit reached", "out of view", "time", "undecided"
@@ -112,7 +111,7 @@ class OutcomeClassifier(Value):
         """Return a text on the observation that leaves its camera's field of view."""
         reference = self.setup.mechanism.reference
         first = min(self.setup.observed, key=lambda o: o.in_front(at.pose(o.seen_from or reference), at.pose(o.link)))
-        return f"{first.kind} {first.leg} leaves the field of view"
+        return f"{first.text} leaves the field of view"
 
     def _serve(self, at: ClosedConfiguration, values: Measures) -> RunOutcome:
         opposite = [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -10,15 +11,17 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from ..budgets import IMAGE_OVERSAMPLING_COUNT
+from ..description.simulator_models import load_mujoco
 from ..errors import MissingExtra, RenderFailure
 from ..geometry.vectors import Array, invert_pose, normalise_vector
 from ..mechanism import Mechanism
 from .camera import Camera, Cylinder, rebuilt
-from .dynamics import simulator
 from .law import Measures, Poses
 from .mujoco_model import MUJOCO_ROD_RADIUS_FRACTION, rods
 from .noise import NOISE_PERIOD_S
+
+IMAGE_OVERSAMPLING_COUNT = 3
+"""Rendered pixels per pixel and direction for edge detection."""
 
 COLOURS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [0, 1, 1], [1, 0, 1]], dtype=float)
 """Colours of the observed legs, on black; the others are dark grey."""
@@ -43,9 +46,13 @@ def vision() -> Any:
 
 
 def drawing() -> Any:
-    """Return the module mujoco, ready to draw without a screen; raises ``MissingExtra`` if it is not installed."""
-    os.environ.setdefault("MUJOCO_GL", "egl")
-    return simulator("rendering images")
+    """Return the module mujoco; raises ``MissingExtra`` if it is not installed, ``RenderFailure`` if it was imported so
+    that it draws on a screen and there is none: MuJoCo would end the process."""
+    mujoco = load_mujoco("rendering images")
+    on_screen = sys.platform == "linux" and mujoco.GLContext.__module__.startswith("mujoco.glfw")
+    if on_screen and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise RenderFailure("MuJoCo draws with GLFW and there is no screen")
+    return mujoco
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,8 @@ from typing import Annotated, Literal
 import numpy as np
 
 from ..analysis.modes.assembly_mode import AssemblyMode
-from ..analysis.observed import UNLIMITED, ObservedRobot
+from ..analysis.observed import ObservedRobot
+from ..analysis.setup_records import LIMITS_IGNORED
 from ..geometry.so3 import compute_rotation_angle
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
@@ -147,7 +148,7 @@ class Servo(Result, shown_as="servo"):
     noise_record = Shown(str | None, lambda self: self.noise and str(self.noise), As("noise"))
     modes = Shown(list[AssemblyMode] | None, lambda self: self.run_outcome.modes and self.run_outcome.modes.modes)
     type2 = Shown(TrackRecord, lambda self: self.track.timed(self.run.times))
-    limits_ignored = Shown(list[str], lambda self: self.setup.limits_ignored, UNLIMITED)
+    limits_ignored = LIMITS_IGNORED
     times = Shown(list[float], lambda self: self.run.times, "times (s)")
     error = Shown(list[list[float]], lambda self: self.errors, "error of each observation at each time")
     poses = Shown(list[Pose], lambda self: [self.pose_of(at) for at in self.run.configurations])

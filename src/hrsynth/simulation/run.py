@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from ..budgets import RUN_ESCAPE_DISTANCE_MAX, RUN_EVALUATIONS_MAX, TANGENT_CHART_RADIUS_MAX
 from ..errors import LoopClosureFailure, UndefinedValue
 from ..geometry.vectors import Array
 from ..kinematics.chart import TangentChart
@@ -22,23 +21,38 @@ from ..kinematics.limits import CoordinateIntervals
 from ..kinematics.velocity_relation import ObservationModel
 from ..progress import report
 from ..results import Value
-from ..tolerances import (
-    EQUILIBRIUM_DISTANCE_TOL,
-    EQUILIBRIUM_NEWTON_STEP_MAX,
-    EQUILIBRIUM_NEWTON_STEP_TOL,
-    EQUILIBRIUM_SLOPE_STEP_MAX,
-    EQUILIBRIUM_SPEED_TOL,
-    LOOP_RANK_LOSS_FRACTION,
-    NEUTRAL_GROWTH_RATE_TOL,
-    PSEUDOINVERSE_CUTOFF_FRACTION,
-    RUN_INTEGRATOR_TOL,
-    RUN_STEP_MIN,
-    RUN_STRETCH_ERROR_FRACTION,
-    SERVO_CONVERGED_TOL,
-    VISIBLE_SINE_MIN,
-)
+from ..tolerances import PSEUDOINVERSE_CUTOFF_FRACTION, VISIBLE_SINE_MIN
 from .law import Command, Desired, Law, Sense
 from .noise import NOISE_PERIOD_S
+
+LOOP_RANK_LOSS_FRACTION = 1e-3
+"""Fraction of its initial value at which the loops' smallest singular value stops a servo run."""
+SERVO_CONVERGED_TOL = 1e-10
+"""Norm of the error at which a servo run has reached its goal."""
+EQUILIBRIUM_SPEED_TOL = 1e-8
+"""Speed (characteristic lengths, radians) per error and gain below which a servo loop is at an equilibrium."""
+EQUILIBRIUM_NEWTON_STEP_TOL = 1e-10
+"""Newton step (characteristic lengths, radians) at which an equilibrium is found."""
+EQUILIBRIUM_DISTANCE_TOL = 1e-6
+"""Distance (characteristic lengths, radians) from a stable equilibrium at which a servo run has reached it."""
+EQUILIBRIUM_SLOPE_STEP_MAX = 1e-4
+"""Step of the differences of ẏ at an equilibrium: less than the width over which the law is damped."""
+EQUILIBRIUM_NEWTON_STEP_MAX = 0.1
+"""Longest Newton step (characteristic lengths, radians) to an equilibrium."""
+NEUTRAL_GROWTH_RATE_TOL = 1e-6
+"""Growth (per time constant) up to which a motion at an equilibrium is neutral; largest speed of no drift."""
+RUN_INTEGRATOR_TOL = 1e-6
+"""Relative tolerance of the integrator of a servo run."""
+RUN_STRETCH_ERROR_FRACTION = 1e-2
+"""Fraction of its initial error at which a segment of a servo run ends, so that the tolerance follows the error."""
+RUN_STEP_MIN = 1e-9
+"""Shortest step (time constants) that a blocked servo run tries."""
+TANGENT_CHART_RADIUS_MAX = 0.5
+"""Length of tangent chart coordinates (characteristic lengths, radians) that starts a new chart."""
+RUN_ESCAPE_DISTANCE_MAX = 20.0
+"""Distance (characteristic lengths) from its start at which a platform has diverged."""
+RUN_EVALUATIONS_MAX = 20_000
+"""Largest number of configurations evaluated by the integrator in a servo run."""
 
 State = tuple[ClosedConfiguration, Command]
 

@@ -13,9 +13,9 @@ from ..analysis.accuracy.accuracy import require_full_observation
 from ..analysis.accuracy.measurement_bounds import IN_SIGHT
 from ..analysis.analysis_declaration import analysis
 from ..analysis.configuration_report import REGULAR, UNDECIDED, ConfigurationAnalysis
-from ..analysis.observed import POINTS, CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SensorLike, StartPose
+from ..analysis.observation_inputs import POINTS, CameraLike, LegsLike, Seed, SensorLike, StartPose
+from ..analysis.observed import ObservedRobot, RobotLike
 from ..analysis.pose_requests import solve_configurations
-from ..budgets import RUN_DURATION_MAX_S, RUN_EVALUATIONS_MAX
 from ..errors import BadRequest, UndecidedRank
 from ..geometry.so3 import compute_rotation_angle
 from ..geometry.vectors import Array
@@ -38,7 +38,10 @@ from .noise import NoiseSamples, Sensors
 from .outcome import OutcomeClassifier
 from .rendered_images import LegRenderer, RenderedImages, drawing, vision
 from .result import Scatter, Servo
-from .run import AWAY, EFFORT, LIMIT, UNMEASURED, UNSEEN, Loop, Run
+from .run import AWAY, EFFORT, LIMIT, RUN_EVALUATIONS_MAX, UNMEASURED, UNSEEN, Loop, Run
+
+RUN_DURATION_MAX_S = 10_000.0
+"""Longest run (s) with noise, in dynamic simulation or along a path; these continue to their end."""
 
 SERVO_GAIN_PER_S = 0.8
 """λ of MMT 5.1.1."""
@@ -240,7 +243,7 @@ class ServoTask:
     ) -> ServoTask:
         """Build the task of a request; raises what :func:`format_run` raises."""
         wanted = [parse_pose(each) for each in (start, goal)]
-        setup = setup.telling(wanted)
+        setup = setup.printing_like(wanted)
         require_seen(setup)
         first, last = solve_configurations(setup, wanted)
         return cls.between(setup, first, last, conditions, seed)
@@ -455,7 +458,7 @@ def require_sight(setup: ObservedRobot, law: Law, name: str, at: ClosedConfigura
         if seen.in_front(X, at.pose(seen.link)) < VISIBLE_SINE_MIN:
             pose = setup.motion.pose(at.pose(setup.motion.link))
             raise BadRequest(
-                f"{setup.robot.name}: {seen.kind} {seen.leg} is not in front of its camera at the {name}",
+                f"{setup.robot.name}: {seen.text} is not in front of its camera at the {name}",
                 str(pose),
                 remedy=IN_SIGHT,
             )
@@ -466,7 +469,7 @@ def require_regular(analysis: ConfigurationAnalysis, name: str, at: ClosedConfig
     posture = analysis.classify(at)
     robot, pose = analysis.setup.robot.name, str(posture.pose)
     if posture.hidden.state == UNDECIDED:
-        raise UndecidedRank(f"{robot} at the {name} {pose}", posture.hidden.gap, RANK_GAP_MIN)
+        raise UndecidedRank(f"{robot} at the {name} {pose}", posture.hidden.gap, RANK_GAP_MIN, "Choose another pose.")
     if posture.hidden.state != REGULAR:
         kind = {"type1": "a Type 1", "type2": "a Type 2", "type3": "a Type 3"}.get(posture.hidden.state, "a constraint")
         raise BadRequest(f"{robot}: the {name} is {kind} singularity", pose, remedy="Choose a regular pose.")

@@ -12,12 +12,11 @@ import time
 import numpy as np
 
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.budgets import RUN_ESCAPE_DISTANCE_MAX
 from hrsynth.geometry.so3 import convert_rotations_to_vectors
-from hrsynth.simulation.equilibria.attraction_radius import certified_radius
+from hrsynth.simulation.equilibria.attraction_radius import prove_attraction_radius
 from hrsynth.simulation.equilibria.batched_runs import BatchedRuns
 from hrsynth.simulation.equilibria.flow import Flow
-from hrsynth.simulation.run import SERVED_AT
+from hrsynth.simulation.run import RUN_ESCAPE_DISTANCE_MAX, SERVED_AT
 from hrsynth.simulation.servo import ServoTask
 
 PART = 5_000
@@ -29,7 +28,7 @@ class Inside:
     def __init__(self, name: str, legs: str | None) -> None:
         self.setting = ObservedRobot.of(name, legs)
         self.goal = self.setting.all_samples.start
-        self.found = certified_radius(self.setting, self.goal)
+        self.found = prove_attraction_radius(self.setting, self.goal)
         task = ServoTask.between(self.setting, self.goal, self.goal)
         assert self.setting.placer is not None
         self.flow = Flow(self.setting.placer, tuple(self.setting.labels), task.directions)

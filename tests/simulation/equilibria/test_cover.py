@@ -3,6 +3,8 @@ on a closed surface their kinds sum up to what its shape asks for."""
 
 from dataclasses import replace
 from itertools import product
+from types import SimpleNamespace
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -15,12 +17,16 @@ from scipy.spatial.transform import Rotation
 from hrsynth import load
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.pose_requests import solve_configurations
-from hrsynth.budgets import SUBDIVISION_BOXES_MAX
-from hrsynth.closed_forms.legs import OnCrank, OnRail, OnRod, SlidingRod
+from hrsynth.closed_forms.legs import OnRail, OnRod
+from hrsynth.equations.joint_equations import build_loop_system, evaluate_residuals
+from hrsynth.equations.loop_parts import DISTANCE
 from hrsynth.geometry.affine import make_affine
+from hrsynth.geometry.so3 import turn_about
 from hrsynth.geometry.vectors import Array, hat
+from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.mechanism.pose import parse_pose
 from hrsynth.simulation.equilibria.exhaustive_search import (
+    LOCKED_PLACE_EDGE_FRACTION,
     SubdivisionResult,
     _cut_long,
     _places,
@@ -29,11 +35,11 @@ from hrsynth.simulation.equilibria.exhaustive_search import (
     reachable_box,
 )
 from hrsynth.simulation.equilibria.flow import Places
-from hrsynth.simulation.equilibria.joint_bounds import narrow_joint, narrow_joints
-from hrsynth.simulation.equilibria.joint_error import JointError, across
+from hrsynth.simulation.equilibria.joint_bounds import narrow_angle, narrow_travel
+from hrsynth.simulation.equilibria.joint_error import JointError
 from hrsynth.simulation.equilibria.pose_error import PoseError
-from hrsynth.simulation.equilibria.subdivision import Subdivision, forms_of
-from hrsynth.tolerances import LOCKED_PLACE_EDGE_FRACTION, POSE_BOX_MIN_FRACTION
+from hrsynth.simulation.equilibria.subdivision import POSE_BOX_MIN_FRACTION, Subdivision, forms_of
+from hrsynth.tolerances import SUBDIVISION_BOXES_MAX
 from simulation import scenes
 from strategies import random_rotation, transformed
 
@@ -146,7 +152,7 @@ def test_joints_are_narrowed_to_where_the_legs_close(name):
             make_affine(x[None], each[None], np.zeros(1))
             for x, each in zip((a + b) / 2, np.diag((b - a) / 2), strict=True)
         ]
-        inner, outer = narrow_joints(error, forms, a[None], b[None])
+        inner, outer = error.narrow(forms, a[None], b[None])
         for i in range(n - k, n):
             for _ in range(3):
                 y = np.tile(pose + room * rng.uniform(-1, 1, n - k), (len(places), 1))
@@ -204,7 +210,7 @@ def test_a_tube_holds_all_that_meets_the_equations_in_its_box(name):
             y = closed(error, rng.uniform(low, high)[None], np.arange(n - k, n)[None])
         half = times * (high - low)[None] * rng.uniform(0.3, 1, (1, n))
         middle, part.tubes = y + half * rng.uniform(-0.9, 0.9, (1, n)), []
-        part._open(middle, half)
+        part(middle, half)
         for v, r, P, N in part.tubes:
             x = np.repeat(middle, 60, axis=0) + half * rng.uniform(-1, 1, (60, n))
             x = closed(error, x, np.repeat(P, 60, axis=0))
@@ -257,7 +263,7 @@ def test_moments_about_a_tip_are_those_of_the_other_legs(name):
                     if each.limb in rest:
                         limb, u = pose.limbs[each.limb], []
                         for mode in (1.0, -1.0):
-                            found = replace(limb, mode=mode).direction(moved[None], turned[None])[0][0]
+                            found = replace(limb, mode=mode).pose(moved[None], turned[None])[0][0]
                             u.append(found * each.sense)
                         own = min(u, key=lambda each, there=here[place]: np.abs(each - there).max())
                         E += 0.5 * (1 - (own @ wanted[each.limb]) ** 2)
@@ -270,38 +276,113 @@ def test_moments_about_a_tip_are_those_of_the_other_legs(name):
 
 @given(st.integers(0, 2**32 - 1))
 def test_no_place_of_a_joint_is_lost(seed):
-    """A crank's and a sliding rod's angle z solves a quadratic in exp(iz), a slider's way one of its own; of a tip in
-    bounds each of these that is between the joint's bounds stays between the narrowed ones."""
+    """An angle z solves a quadratic in exp(iz), a travel one of its own; of coefficients in bounds each zero that is
+    between the joint's bounds stays between the narrowed ones. Where a bound is no number, nothing is narrowed."""
     rng = np.random.default_rng(seed)
     size = 10.0 ** rng.uniform(-6, 0.5)
-    low = rng.normal(size=3) * rng.choice([1e-6, 0.1, 1.0], 3)
+    low = rng.normal(size=3) * rng.choice([0, 1e-6, 0.1, 1.0], 3)
     high = low + size * rng.uniform(size=3) * rng.choice([0, 1], 3)
-    x, v = (lambda tip: (tip[0], complex(*tip[1:])))(low + (high - low) * rng.uniform(size=3))
-    rod, radius, aside = rng.uniform(0.2, 2.0, 3) * [1, 1, rng.choice([0.0, 0.3, -0.3])]
-    z_axis = np.array([0.0, 0.0, 1.0])
-    limbs = [
-        (
-            OnRail("", axis=z_axis, rod=rod),
-            [x - 1, x + 1] if abs(v) > rod else [x + sign * np.sqrt(rod**2 - abs(v) ** 2) for sign in (-1, 1)],
-        ),
-        (
-            OnCrank("", axis=z_axis, rod=rod, radius=radius),
-            [np.conj(v), -(x**2 + abs(v) ** 2 + radius**2 - rod**2) / radius, v],
-        ),
-        (SlidingRod("", axis=z_axis, aside=aside), [-np.conj(v), -2j * aside, v]),
+    A, B, C = low + (high - low) * rng.uniform(size=3)
+    bounds = [(low[[i]], high[[i]]) for i in range(3)]
+    with np.errstate(all="ignore"):
+        ratio = np.sort(-A / np.hypot(B, C) + size * np.array([rng.normal(), 0.0]))[:, None]
+    ratio = ratio if rng.integers(2) else np.full((2, 1), np.nan)
+    squares = np.sort([B * B - 2 * A, B * B - 2 * A + size * rng.normal()])[:, None]
+    kinds: list[tuple[Any, ...]] = [
+        (narrow_angle, [*bounds, (ratio[0], ratio[1])], np.roots([(B - 1j * C) / 2, A, (B + 1j * C) / 2]), np.pi),
+        (narrow_travel, [bounds[1], (squares[0], squares[1])], np.roots([0.5, B, A]), 5.0),
     ]
-    along, one, two = ((low[[i]], high[[i]]) for i in range(3))
-    for limb, told in limbs:
-        if isinstance(limb, OnRail):
-            places, whole = told if abs(v) <= rod else [], 5.0
-        else:
-            roots = np.roots(told)
-            places, whole = [float(np.angle(w)) for w in roots if abs(abs(w) - 1) < 1e-12], np.pi
+    for narrow, told, roots, whole in kinds:
+        turning = narrow is narrow_angle
+        met = np.abs(np.abs(roots) - 1) < 1e-12 if turning else np.abs(roots.imag) < 1e-12
         own = np.sort(rng.uniform(-whole, whole, 2)) if rng.integers(2) else np.array([-whole, whole])
-        inner, outer = narrow_joint(limb, along, one, two, (own[[0]], own[[1]]))
-        for place in places:
+        edges = own[[0]], own[[1]]
+        inner, outer = narrow(told, edges)
+        for place in np.angle(roots[met]) if turning else roots[met].real:
             if own[0] + 1e-9 < place < own[1] - 1e-9:
                 assert inner[0] - 1e-9 <= place <= outer[0] + 1e-9
+        assert narrow([(low[[0]], np.array([np.nan])), *told[1:]], edges) == edges
+
+
+def read_coordinates(setup, error, system, at):
+    """Coordinates of the platform's pose, and of the joints at the base as the joint graph has them."""
+    base, legs, pose = setup.mechanism.base, {each.label: each for each in setup.decomposition.legs}, error.error
+    (p, R), q0 = (each[0] for each in pose.coordinates.of([at])), system.read(setup.all_samples.start.pose)
+    y = [*(pose.shifts.T @ (p - pose.p)), *(turn_about(axis, R @ pose.R.T)[0] for axis in pose.turns.T)]
+    for i, joint in zip(error.joints, error.feet, strict=True):
+        limb = pose.limbs[i]
+        (foot,) = (each for each in legs[limb.label].joints if base in setup.mechanism.joints[each].links)
+        (place,) = (place for place, each in enumerate(system.coordinates) if each.joint == foot)
+        start = limb.solve(limb.tip.value(pose.p[None], pose.R[None]), limb.mode)[1][0]
+        start = start - limb.centre if isinstance(limb, OnRod) else start
+        way = (system.read(at.pose) - q0)[place] * np.sign(joint.axis @ system.coordinates[place].axis)
+        y.append(
+            joint.axis @ start + way
+            if joint.start is None
+            else np.arctan2(joint.ahead @ start, joint.start @ start) + way
+        )
+    return y
+
+
+@pytest.mark.some(2)
+@pytest.mark.parametrize("name", ["delta", "orthoglide", "3prr_m1", "linear_delta", "quattro_rigid"])
+def test_equations_of_rods_are_those_of_the_joint_graph(name):
+    """Of robots whose graph leaves out the joint at a rod's near end: also where they do not hold, at any place of the
+    free platform and of the joints, each rod's distance between its ends is off by as much."""
+    setup, rng = scenes.setting(name), np.random.default_rng(0)
+    error = JointError.of(PoseError.of(setup, setup.all_samples.start))
+    system = build_loop_system(setup.mechanism, (), free=True)
+    rods = {loop.name: loop for loop in system.loops if loop.swung is not None}
+    free = [i for i, each in enumerate(system.coordinates) if setup.mechanism.platform in each.joint]
+    for _ in range(5):
+        values = rng.uniform(-0.5, 0.5, len(system.coordinates))
+        values[free[error.freedoms :]] = 0.0
+        at = SimpleNamespace(pose=lambda link, values=values: system.pose(link, values))
+        y = read_coordinates(setup, error, system, at)
+        forms = [make_affine(np.array([each]), np.zeros((1, 0)), np.zeros(1)) for each in y]
+        told = error.closing.together(forms).v[0, 0]
+        off = [evaluate_residuals(system, loop, values, [DISTANCE])[0][0] for loop in rods.values()]
+        assert len(off) in (len(told), 2 * len(told))
+        assert np.abs(np.array(off).reshape(len(told), -1) - told[:, None]).max() < 1e-10
+        assert np.abs(told).min() > 1e-6
+
+
+@pytest.mark.some(4)
+@pytest.mark.parametrize(
+    "name",
+    [
+        "3puu",
+        "quattro",
+        "rrrrr_m1",
+        "3rpr_m1",
+        "3prr_m1",
+        "3rrr_m1",
+        "delta",
+        "linear_delta",
+        "orthoglide",
+        "prrrp_m1",
+        "quattro_rigid",
+        "rprpr_m1",
+    ],
+)
+def test_equations_hold_where_the_joint_graph_is_closed(name):
+    """At configurations of the whole mechanism, with the coordinates of the joints at the base that its joint graph
+    has: a rod that has a joint inside, or a rod too many, does not hold there; and no equation depends on the others.
+    Directions are those that are measured."""
+    setup = scenes.setting(name)
+    pose = PoseError.of(setup, setup.all_samples.start)
+    error, system = JointError.of(pose), build_loop_system(setup.mechanism, ())
+    n, k = error.size
+    assert n - k == pose.size
+    for at in setup.configurations[:6]:
+        y = read_coordinates(setup, error, system, at)
+        forms = [make_affine(np.array([each]), np.zeros((1, 0)), np.zeros(1)) for each in y]
+        told = error.slopes.together(forms).v[0, 0]
+        assert np.abs(told[:k]).max() < 1e-10
+        assert np.linalg.matrix_rank(told[k : k + k * n].reshape(k, n), 1e-6) == k
+        u = error.directions.together(forms).v[0].reshape(-1, 3)
+        seen = [at.pose(each.link)[:3, :3] @ each.direction for each in setup.observed if isinstance(each, Direction)]
+        assert np.abs(u - seen).max() < 1e-10
 
 
 @pytest.mark.slow
@@ -500,7 +581,7 @@ def test_smallest_boxes_about_a_flat_zero_are_settled():
     half = np.broadcast_to(POSE_BOX_MIN_FRACTION * part.whole, middle.shape)
     assert part._near_zero(middle, half, np.broadcast_to([3, 4, 5], (12, 3))).all()
     assert 0 < len(part.flat) < 5
-    assert len(part._open(middle, half)[0]) == 0
+    assert len(part(middle, half)[0]) == 0
     (zero,) = {tuple(np.round(each.x, 5)) for each in part.zeros()}
     modes = [limb.mode for limb in error.limbs]
     met = [
@@ -546,7 +627,7 @@ def exact_level(error, y):
     """E in many digits for cranks, as a function of the pose's coordinates, in the working modes of joints y."""
     legs = []
     for limb, angle, wanted in zip(error.limbs, y[error.size :], JointError.of(error).wanted, strict=True):
-        one, two = (mpmath.matrix(each.tolist()) for each in across(limb))
+        one, two = (mpmath.matrix(each.tolist()) for each in (limb.joint.start, limb.joint.ahead))
         legs.append((limb, one, two, mpmath.matrix(np.asarray(wanted, dtype=float).tolist()), angle))
 
     def dot(a, b):
@@ -600,9 +681,11 @@ def test_a_place_that_locks_is_at_a_turn(turn: float, inside: bool) -> None:
 
 
 @pytest.mark.slow
-def test_boxes_that_fill_a_long_place_are_cut_finer() -> None:
+def test_boxes_that_fill_a_long_place_are_cut_finer(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where two rods of a Quattro's plate are parallel the moment about their tip nearly vanishes over some degrees of
-    its turn: boxes of a ten thousandth of the whole are too coarse to tell where."""
+    its turn: boxes of a ten thousandth of the whole are too coarse to tell where, if places are to be this short."""
+    shortest = 0.8 * LOCKED_PLACE_EDGE_FRACTION
+    monkeypatch.setattr("hrsynth.simulation.equilibria.exhaustive_search.LOCKED_PLACE_EDGE_FRACTION", shortest)
     error = PoseError.of(scenes.setting("quattro"), scenes.goal("quattro"))
     joints, (low, high, _) = JointError.of(error), reachable_box(error, 1.0)
     part = Subdivision(joints, *joints.box(low, high, 1.0))
@@ -618,11 +701,11 @@ def test_boxes_that_fill_a_long_place_are_cut_finer() -> None:
 
     assert part.lost
     assert not part.left
-    assert longest() > LOCKED_PLACE_EDGE_FRACTION
+    assert longest() > shortest
     _cut_long([part], size, 500_000, 1)
     assert part.lost
     assert not part.left
-    assert longest() < LOCKED_PLACE_EDGE_FRACTION / 2
+    assert longest() < shortest / 2
 
 
 @pytest.mark.slow
@@ -631,8 +714,8 @@ def test_nothing_depends_on_the_number_of_processes(monkeypatch: pytest.MonkeyPa
     what they hold."""
     setup = ObservedRobot.of("rrrrr_m1")
     alone = cover(setup, setup.all_samples.start)
-    monkeypatch.setattr("hrsynth.simulation.equilibria.subdivision.SERIAL_SUBDIVISION_BOXES_COUNT", 300)
-    monkeypatch.setattr("hrsynth.simulation.equilibria.subdivision.BOXES_A_PART", 100)
+    monkeypatch.setattr("hrsynth.solving.exhaust.SERIAL_BOXES_COUNT", 300)
+    monkeypatch.setattr("hrsynth.solving.exhaust.BOXES_A_PART", 100)
     for jobs in (1, 2):
         shared = cover(setup, setup.all_samples.start, jobs=jobs)
         assert shared.is_complete
@@ -691,11 +774,11 @@ def test_progress_claims_no_more_than_is_settled(monkeypatch: pytest.MonkeyPatch
     """Each round settles one of two halves: the space left is halved, and the boxes that were looked at are counted."""
 
     class Halved(Subdivision):
-        def _open(self, middle: Array, half: Array) -> tuple[Array, Array, Places]:
+        def __call__(self, middle: Array, half: Array) -> tuple[Array, Array, Places]:
             return middle[-1:], half[-1:], np.zeros(1, dtype=np.intp)
 
     told: list[str] = []
-    monkeypatch.setattr("hrsynth.simulation.equilibria.subdivision.report", told.append)
+    monkeypatch.setattr("hrsynth.solving.exhaust.report", told.append)
     Halved(None, -np.ones(2), np.ones(2)).run(12, 1, 3)  # type: ignore[arg-type]
     assert told[:3] == [
         "boxes of search 2 of 3: 0 % of the space settled, 0 processed of at most 12, 1 waiting",

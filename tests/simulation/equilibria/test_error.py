@@ -8,11 +8,11 @@ import pytest
 from analysis.test_sensors import KINDS, arm, free_body, watched
 from hrsynth.analysis.observed import ObservedRobot, build_motor_model
 from hrsynth.description import load
+from hrsynth.equations.measured_error import CriticalPointEquations, ErrorSystem
 from hrsynth.geometry.affine import make_affine
 from hrsynth.kinematics.configuration import ClosedConfiguration, measure
 from hrsynth.mechanism.observations.direction import SeenAxis
 from hrsynth.mechanism.observations.image_circle import ImageCircle
-from hrsynth.simulation.equilibria.error import CriticalPointEquations, ErrorSystem
 from simulation.scenes import few_first, setting
 
 ROBOTS = few_first(

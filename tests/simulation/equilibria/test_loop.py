@@ -1,14 +1,20 @@
 """Rests of two watched legs by the force that closes their loop: in a plane they are those of boxes over the pose; of
 the Quattro no other is met on Lagrange's equations written by hand, and the kinds sum up to what the loop's shape asks
-for."""
+for. Of robots of random dimensions a list holds all that a thousand starts meet."""
 
-from dataclasses import replace
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.pose_requests import solve_configurations
 from hrsynth.closed_forms.legs import OnCrank, OnRail
+from hrsynth.geometry.vectors import Array
+from hrsynth.mechanism.builder import Builder
+from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.mechanism.pose import parse_pose
 from hrsynth.simulation.equilibria.equilibria import EquilibriumSearch
 from hrsynth.simulation.equilibria.exhaustive_search import cover, reachable_box
@@ -303,3 +309,96 @@ def test_kinds_sum_to_the_euler_number_of_the_loop(legs: str) -> None:
     parallel = len(distinct(np.concatenate([np.cos(x), np.sin(x)]).T))
     assert np.linalg.norm(gap(rng.uniform(-np.pi, np.pi, (3, 10_000))), axis=0).max() < 1.8 * ROD
     assert kinds == 2 * parallel - surface
+
+
+CRANK, RAIL, SLIDE = ("R", "R"), ("P", "R"), ("R", "P")
+
+
+def unit(v):
+    return v / np.linalg.norm(v)
+
+
+def spoke(z):
+    return np.array([np.cos(z), np.sin(z)])
+
+
+@dataclass
+class DrawnLeg:
+    """A leg in a plane to the origin, m: its foot, its crank's length or its rail's direction, its rod or how far that
+    slides aside, and its rod's direction at zero."""
+
+    kind: tuple[str, str]
+    foot: Array
+    own: Array
+    rod: float
+    u: Array
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator) -> DrawnLeg:
+        """One of random kind and dimensions."""
+        (foot, end), u = rng.uniform(-0.8, 0.8, (2, 2)), unit(rng.normal(size=2))
+        kind = (CRANK, RAIL, SLIDE)[rng.integers(3)]
+        if kind == SLIDE:
+            u = u if rng.integers(2) else unit(-foot)
+            return cls(kind, foot, u, float(np.linalg.det([u, -foot])), u)
+        foot, own = (end, u) if kind == RAIL else (foot, np.linalg.norm(end - foot))
+        return cls(kind, foot, own, float(np.linalg.norm(end)), unit(-end))
+
+    def build(self, b: Builder, name: str) -> None:
+        """Add its first two joints."""
+        links = ["base", f"near_{name}", f"far_{name}"]
+        places = self.foot, 0.0 * self.u if self.kind == SLIDE else -self.rod * self.u
+        for k, (letter, at) in enumerate(zip(self.kind, places, strict=True)):
+            axis = (0, 0, 1) if letter == "R" else (*self.own, 0)
+            b.link(links[k + 1])
+            b.joint(f"{letter}{k}_{name}", letter, links[k], links[k + 1], (*at, 0), axis=axis, motor=k == 0)
+
+    def end(self, z: Array, phi: Array) -> tuple[Array, Array, Array]:
+        """Its end (2, n), and the rates by its first joint and by its rod's angle."""
+        foot, u, across = self.foot[:, None], spoke(phi), spoke(phi + np.pi / 2)
+        if self.kind == SLIDE:
+            return foot + z * u + self.rod * across, u, z * across - self.rod * u
+        if self.kind == RAIL:
+            return foot + np.outer(self.own, z) + self.rod * u, self.own[:, None] + 0 * u, self.rod * across
+        return foot + self.own * spoke(z) + self.rod * u, self.own * spoke(z + np.pi / 2), self.rod * across
+
+
+def balance(y: Array, legs: list[DrawnLeg]) -> Array:
+    """The slope (10, n) of Lagrange's function by the end of both legs, and by each leg's joint, its rod's angle and
+    the multipliers of its closure."""
+    whole, found = 0 * y[:2], list[Array]()
+    for leg, (z, phi, *pull) in zip(legs, y[2:].reshape(2, 4, -1), strict=True):
+        mu, (end, by_z, by_phi) = np.array(pull), leg.end(z, phi)
+        whole = whole - mu
+        error = -(leg.u @ spoke(phi)) * (leg.u @ spoke(phi + np.pi / 2))
+        found += [(mu * by_z).sum(axis=0), (mu * by_phi).sum(axis=0) + error, *(end - y[:2])]
+    return np.array([*whole, *found])
+
+
+@pytest.mark.some(1, 3)
+@pytest.mark.parametrize("seed", range(1, 21))
+def test_random_starts_meet_no_other_rest_of_random_robots(seed: int) -> None:
+    """Two legs in a plane, of random kinds and dimensions, share their end: Newton's method on Lagrange's equations,
+    written by hand, meets from a thousand starts the listed rests and no other."""
+    rng, b = np.random.default_rng(seed), Builder("drawn")
+    b.link("base")
+    legs = [DrawnLeg.draw(rng) for _ in "12"]
+    for k, leg in enumerate(legs):
+        leg.build(b, str(k))
+    b.joint("end", "R", "far_0", "far_1", axis=(0, 0, 1), loop=True)
+    setup = ObservedRobot.of(b.build(platform="far_0"))
+    found = cover(setup, setup.all_samples.start)
+    assert found.is_complete
+    assert found.error is not None
+    listed = np.array([[*each.p[:2], *each.directions[:, :2].ravel()] for each in found.found])
+    y = newton(lambda y: balance(y, legs), 1.5 * rng.normal(size=(10, STARTS)))
+    if found.box is not None:
+        x = found.error.shifts[:2].T @ (y[:2] / found.error.length - found.error.p[:2, None])
+        low, high = (each[:2, None] for each in found.box)
+        y = y[:, np.all((low < x) & (x < high), axis=0)]
+    lines = [o for o in setup.observed if isinstance(o, Direction)]
+    senses = [np.sign(o.direction[:2] @ leg.u) for o, leg in zip(lines, legs, strict=True)]
+    met = np.concatenate([y[:2], *(s * spoke(phi) for s, phi in zip(senses, y[3::4], strict=True))]).T
+    away = np.abs(met[:, None] - listed).max(axis=2) / np.maximum(1.0, np.abs(met[:, :2]).max(axis=1))[:, None]
+    assert away.min(axis=1).max() < 1e-5
+    assert len(set(away.argmin(axis=1))) > 0.8 * len(listed)

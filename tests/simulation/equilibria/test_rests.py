@@ -19,6 +19,7 @@ import hrsynth
 from hrsynth.analysis.modes.modes import modes
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.constraints.pattern import list_placing_links
+from hrsynth.equations.measured_error import CriticalPointEquations
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.affine import AffineForms
 from hrsynth.geometry.so3 import convert_rotations_to_vectors, convert_vectors_to_rotations
@@ -34,7 +35,6 @@ from hrsynth.simulation.equilibria.descent import CriticalPoint, Tangents, desce
 from hrsynth.simulation.equilibria.enclosure import _rates, enclose_points
 from hrsynth.simulation.equilibria.equilibria import EquilibriumSearch, _sort, _ways, equilibria
 from hrsynth.simulation.equilibria.equilibrium import Equilibria, Equilibrium, SignedModes, stability
-from hrsynth.simulation.equilibria.error import CriticalPointEquations
 from hrsynth.simulation.equilibria.exhaustive_search import cover, reachable_box
 from hrsynth.simulation.equilibria.pose_error import PoseError
 from hrsynth.simulation.equilibria.pose_system import LegSystem
@@ -696,7 +696,7 @@ def test_rests_with_supposed_depths_are_those_of_the_law(depth: str, mixed: bool
 def test_what_cannot_be_asked_of_cameras_is_refused_in_one_line(tmp_path: Path) -> None:
     for options, said in (
         ({"goal": "x=0,y=0,z=-0.5,rpy=0/0/0"}, "not in front of its camera at the goal"),
-        ({"goal": TILTED, "complete": True}, "supports directions of segments only: got 'point "),
+        ({"goal": TILTED, "complete": True}, "supports directions of segments only: got 'observation "),
     ):
         with pytest.raises(BadRequest, match=said):
             body(tmp_path, seen(SQUARE), **options)

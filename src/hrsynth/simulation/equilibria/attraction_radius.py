@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis.observed import ObservedRobot
-from ...batch.enclosures import BoxFormula, trace_formula
-from ...budgets import ATTRACTION_RADIUS_BOXES_MAX, GOAL_RAYS_COUNT
+from ...equations.box_formula import BoxFormula, trace_formula
 from ...geometry.affine import AffineForms, make_affine, stack
 from ...geometry.so3 import compute_rotation_angle
 from ...geometry.vectors import Array, transform
@@ -24,30 +23,30 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...records import As, recorded
 from ...results import Value
-from ...tolerances import (
-    AFFINE_ROUNDING,
-    HIDDEN_ROBOT_RESIDUAL_TOL,
-    POINT_DISTANCE_TOL,
-    PROVED_LEVEL_FRACTION,
-    RADIUS_SHARES,
-    RANK_CUTOFF_FRACTION,
-)
-from .cones import ConeProver, ProvedCones, prove_cones, proved_all_over
-from .inward_flow import inward_radius
+from ...solving.exhaust import SETTLED, Boxes, Exhaustion
+from ...tolerances import AFFINE_ROUNDING, HIDDEN_ROBOT_RESIDUAL_TOL, POINT_DISTANCE_TOL, RANK_CUTOFF_FRACTION
+from .cones import ConeProver, ProvedCones, prove_cones
+from .inward_flow import GOAL_RAYS_COUNT, inward_radius
 from .pose_error import EnclosureFailure, PoseError
+
+PROVED_LEVEL_FRACTION = 0.95
+"""Fraction of the error at which rays stop rising, up to which the proof tries that all rays rise."""
+RADIUS_SHARES = (0.97, 0.9, 0.8, 0.65, 0.5, 0.3)
+"""Fractions of the radius found by rays that are tried in turn as attraction radius."""
+ATTRACTION_RADIUS_BOXES_MAX = 60_000
+"""Largest number of boxes in the proof of an attraction radius."""
 
 CERTIFIED, UNDECIDED = "certified", "undecided"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CertifiedRadius(Value):
+class AttractionRadius(Value):
     """Proved attraction radius of a goal, in its working mode: every run that starts with the platform position within
     ``length`` (m) and, if the platform rotates, its rotation within ``angle`` (rad) of the goal's (both at once) ends
     at the goal.
 
     ``level`` is c, ``least`` a lower bound of ‖∇E‖ / |x|, x the pose relative to the goal (characteristic lengths,
-    halves of tangents of half the rotation); ``boxes`` were tried. If nothing is proved, ``reason`` gives the cause;
-    ``limits`` are joints whose limits are ignored.
+    halves of tangents of half the rotation). If nothing is proved, ``reason`` gives the cause.
     """
 
     goal: ClosedConfiguration
@@ -56,7 +55,6 @@ class CertifiedRadius(Value):
     angle: Annotated[float | None, As("radius_rad")]
     level: float
     least: float
-    boxes: int
     reason: str
     undamped: float = 0.0
     """Radius while the law is not damped (characteristic lengths, radians)."""
@@ -107,7 +105,7 @@ class CertifiedRadius(Value):
         )
 
 
-def certified_radius(setup: ObservedRobot, goal: ClosedConfiguration) -> CertifiedRadius:
+def prove_attraction_radius(setup: ObservedRobot, goal: ClosedConfiguration) -> AttractionRadius:
     """Return the largest attraction radius proved with the budget of boxes, for observed directions of segments."""
     try:
         if not all(each.is_segment_direction for each in setup.observed):
@@ -119,22 +117,21 @@ def certified_radius(setup: ObservedRobot, goal: ClosedConfiguration) -> Certifi
             raise EnclosureFailure(f"a run may stop at a joint limit: {', '.join(error.limits)}")
         proved = _proved_cones(error)
     except EnclosureFailure as why:
-        return CertifiedRadius(goal, setup.motion, 0.0, None, 0.0, 0.0, 0, str(why))
-    reach, boxes = _reach(proved)
+        return AttractionRadius(goal, setup.motion, 0.0, None, 0.0, 0.0, str(why))
+    reach = _reach(proved)
     angle = reach if error.turns.shape[1] else None
     # |x| ≤ t |W| √n on the faces of the cube
     least = proved.rise / (error.size * float(np.linalg.norm(proved.prover.W, 2)) ** 2)
     reason = "forms of the legs and the error enclosed in cones about the goal"
-    ball, more = inward_radius(error)
+    ball = inward_radius(error)
     aside = bool(np.linalg.norm(error.motion.point - setup.motion.point) > POINT_DISTANCE_TOL * error.length)
-    return CertifiedRadius(
+    return AttractionRadius(
         goal,
         error.motion,
         reach * error.length,
         angle,
         proved.level,
         least,
-        proved.boxes + boxes + more,
         reason,
         _product(ball) if error.turns.shape[1] else ball,
         aside,
@@ -184,9 +181,8 @@ def _highest(error: PoseError, W: Array) -> float:
     return lowest if np.isfinite(lowest) else float(np.max(before))
 
 
-def _reach(proved: ProvedCones) -> tuple[float, int]:
-    """The radius (characteristic lengths, radians) within which E < c is enclosed, and the boxes for it: near the one
-    that rays show."""
+def _reach(proved: ProvedCones) -> float:
+    """The radius (characteristic lengths, radians) within which E < c is enclosed, near the one that rays show."""
     error, W, c = proved.prover.error, proved.prover.W, proved.level
     # rays evenly about the goal, and towards where E rises fast
     w = np.random.default_rng(0).normal(size=(2 * GOAL_RAYS_COUNT, error.size))
@@ -202,13 +198,9 @@ def _reach(proved: ProvedCones) -> tuple[float, int]:
     errors = trace_formula(
         lambda inputs, number: [x for each in error.at(inputs, [], number).seen for x in each.error], error.size
     )
-    Q, boxes = proved.prover.Q @ np.linalg.inv(W), 0
-    for share in RADIUS_SHARES:
-        held, used = _below(error, errors, Q, share * seen, c)
-        boxes += used
-        if held:
-            return share * seen, boxes
-    return 0.0, boxes
+    Q = proved.prover.Q @ np.linalg.inv(W)
+    radii = (share * seen for share in RADIUS_SHARES)
+    return next((radius for radius in radii if _is_below(error, errors, Q, radius, c)), 0.0)
 
 
 def _gauge(error: PoseError, x: Array) -> Array:
@@ -235,16 +227,17 @@ def _highest_on(errors: BoxFormula, Q: Array, middle: Array, half: Array) -> Aff
     return 0.5 * (square + (2.0 * (Qx * a) + a * a).sum())
 
 
-def _below(error: PoseError, errors: BoxFormula, Q: Array, radius: float, c: float) -> tuple[bool, int]:
-    """Return True if E < c is enclosed at all poses within a radius, by boxes that are cut where it is not; with their
-    number."""
+def _is_below(error: PoseError, errors: BoxFormula, Q: Array, radius: float, c: float) -> bool:
+    """Return True if E < c is enclosed at all poses within a radius, by boxes that are cut where it is not."""
     k, n = error.shifts.shape[1], error.size
     whole = np.where(np.arange(n) < k, radius, np.tan(min(radius, 3.0) / 2)) * (1 + HIDDEN_ROBOT_RESIDUAL_TOL)
 
     def inside(middle: Array, half: Array) -> NDArray[np.bool_]:
         return np.asarray(_gauge(error, np.maximum(np.abs(middle) - half, 0.0)) <= radius)
 
-    def judge(middle: Array, half: Array) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
-        return _highest_on(errors, Q, middle, half).high < c, np.argmax(half / whole, axis=1)
+    def judge(middle: Array, half: Array) -> Boxes:
+        proved = _highest_on(errors, Q, middle, half).high < c
+        return middle, half, np.where(proved, SETTLED, np.argmax(half / whole, axis=1))
 
-    return proved_all_over(whole, inside, judge, ATTRACTION_RADIUS_BOXES_MAX)
+    start = np.zeros((1, n)), whole[None]
+    return Exhaustion(judge, start, ATTRACTION_RADIUS_BOXES_MAX, concerns=inside).run().is_settled

@@ -16,22 +16,11 @@ import numpy as np
 from ...analysis.accuracy.error_map import Mapper
 from ...analysis.accuracy.measurement_bounds import MeasurementBounds
 from ...analysis.analysis_declaration import analysis
-from ...analysis.observed import CameraLike, Jobs, LegsLike, ObservedRobot, RobotLike, Seed, SensorLike
+from ...analysis.observation_inputs import CameraLike, Jobs, LegsLike, Seed, SensorLike
+from ...analysis.observed import ObservedRobot, RobotLike
 from ...analysis.pose_requests import solve_configurations
 from ...batch.grids import list_grid_poses
 from ...batch.pose_continuation import sweep
-from ...budgets import (
-    FLOW_CHECKED,
-    FLOW_EXAMPLES_MAX,
-    FLOW_FEW,
-    FLOW_FOLLOWED,
-    FLOW_NAMED,
-    FLOW_PART,
-    FLOW_SINGLE,
-    FLOW_STARTS,
-    FLOW_STARTS_ONE_BY_ONE,
-    RUN_ESCAPE_DISTANCE_MAX,
-)
 from ...errors import BadRequest, HrsynthError, NoReachablePose
 from ...geometry.so3 import turn_about
 from ...geometry.vectors import Array, compare_poses
@@ -46,14 +35,23 @@ from ...results import Result, Value
 from ...tolerances import RUN_END_DIFFERENCE_TOL, VISIBLE_SINE_MIN
 from ..law import Depth, measure_all
 from ..outcome import ENDINGS, GOAL, SIGHT, TIME, UNDECIDED, OutcomeClassifier, RunOutcome
-from ..run import AWAY, EFFORT, LOST, POISED, REST, SERVED_AT
+from ..run import AWAY, EFFORT, LOST, POISED, REST, RUN_ESCAPE_DISTANCE_MAX, SERVED_AT
 from ..run import TIME as OVER
 from ..servo import Conditions, ServoTask
-from .attraction_radius import CertifiedRadius, certified_radius
+from .attraction_radius import AttractionRadius, prove_attraction_radius
 from .batched_runs import BatchedRuns
 from .equilibrium import Equilibria
 from .flow import Flags, Flow, Places
 from .outcomes import Outcome, OutcomeCount, Outcomes
+
+FLOW_STARTS, FLOW_STARTS_ONE_BY_ONE = 100_000, 2_500
+"""Largest number of starts, batched, and simulated one by one."""
+FLOW_PART, FLOW_FEW, FLOW_SINGLE = 5_000, 2_000, 1
+"""Starts per batch, last starts that continue together, and single runs per task of a process."""
+FLOW_FOLLOWED, FLOW_CHECKED, FLOW_NAMED = 24, 6, 16
+"""Runs of a batch that are simulated one by one because they stopped, as a check, and named equilibria."""
+FLOW_EXAMPLES_MAX = 8
+"""Starts with one end among which an example is chosen that is reached by small steps."""
 
 SIDE, SIDE_ONE_BY_ONE = 100, 15
 """Starts along each side of a plane: batched, and simulated separately."""
@@ -86,7 +84,7 @@ class CertifiedPart(NamedTuple):
     """Proved attraction radius: every start in the goal's working mode within this distance is proved to end at the
     goal; the fraction of the goal's basin that it covers; the larger radius while the law is not damped, if any."""
 
-    radius: Annotated[CertifiedRadius, FLAT]
+    radius: Annotated[AttractionRadius, FLAT]
     covered: float
 
 
@@ -120,7 +118,7 @@ class Basins(Result, shown_as="basins"):
     followed: Recorded[int] = 0
     checked: Recorded[int] = 0
     agreed: Recorded[int] = 0
-    certified: CertifiedRadius | None = None
+    certified: AttractionRadius | None = None
     """Proved attraction radius of the goal."""
 
     @property
@@ -277,9 +275,8 @@ def basins(
     >>> hrsynth.basins("3rrr_m1", goal="x=0,y=0,phi=0", grid="x=-0.02:0.02:5,y=-0.02:0.02:5,phi=0")
     <Basins: 3rrr_m1, observing 1, 2, 3: 100 % of 25 starts end at the goal x=0,y=0,z=0,phi=0deg>
     """
-    setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed)
     asked = parse_pose(goal)
-    setup = setup.telling([asked])
+    setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed).printing_like([asked])
     if plane is not None and grid is not None:
         raise BadRequest(f"--grid {grid}: cannot be combined with --plane", remedy="Omit one.")
     (target,) = solve_configurations(setup, [asked])
@@ -409,7 +406,7 @@ class BasinSearch:
         runs, certified, *alone = self._run_all(
             [
                 partial(first.together(others).run, horizon),
-                partial(certified_radius, self.setup, self.goal),
+                partial(prove_attraction_radius, self.setup, self.goal),
                 *self._single(self._start(X[starts[checked]])),
             ]
         )
@@ -446,7 +443,7 @@ class BasinSearch:
         starts = np.array([i for i, each in enumerate(at) if each is not None], dtype=int)
         cells, outcomes = np.full(len(at), NOT_REACHED), Outcomes(self.goal.model.length)
         certified, *told = self._run_all(
-            [partial(certified_radius, self.setup, self.goal), *self._single([at[i] for i in starts])]
+            [partial(prove_attraction_radius, self.setup, self.goal), *self._single([at[i] for i in starts])]
         )
         for i, outcome in zip(starts, chain(*told), strict=True):
             cells[i] = outcomes.number(outcome)

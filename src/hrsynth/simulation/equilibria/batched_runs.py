@@ -14,30 +14,32 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ...budgets import FLOW_KEPT, FLOW_STEPS
 from ...geometry.vectors import Array, times
 from ...progress import report
 from ...results import Value
-from ...tolerances import (
-    CONTROLLER_DAMPING_MIN,
-    EQUILIBRIUM_SPEED_TOL,
-    FLOW_CLEAR,
-    FLOW_CONTRACTED,
-    FLOW_DAMPING_FRACTION,
-    FLOW_NEAR,
-    FLOW_NEWTON_ERROR_TOL,
-    FLOW_REFRESH_DISTANCE_MAX,
-    FLOW_SLOPE_STEP_MAX,
-    FLOW_STEP_ERROR_TOL,
-    FLOW_STEP_MIN,
-    REACH_BOUNDARY_MARGIN_FRACTION,
-    REVERSED_LEG_MARGIN_FRACTION,
-    RUN_END_DIFFERENCE_TOL,
-    SERVO_CONVERGED_TOL,
-    STRETCHED_LEG_MARGIN_FRACTION,
-)
-from ..run import AWAY, EFFORT, LOST, REST, SERVED_AT, TIME
-from .flow import CommandedMotion, Flags, Flow, Places
+from ...tolerances import CONTROLLER_DAMPING_MIN, RUN_END_DIFFERENCE_TOL
+from ..run import AWAY, EFFORT, EQUILIBRIUM_SPEED_TOL, LOST, REST, SERVED_AT, SERVO_CONVERGED_TOL, TIME
+from .flow import FLOW_DAMPING_FRACTION, FLOW_SLOPE_STEP_MAX, CommandedMotion, Flags, Flow, Places
+
+FLOW_STEP_ERROR_TOL = 3e-5
+"""Error of a step (characteristic lengths, radians) of batched runs."""
+FLOW_STEP_MIN = 1e-4
+"""Step (time constants) at which a run without progress has a leg at the end of its reach."""
+STRETCHED_LEG_MARGIN_FRACTION = 1e-2
+"""Reach margin, as a fraction of that at zero, up to which a leg counts as stretched."""
+REVERSED_LEG_MARGIN_FRACTION = 1e-6
+"""Reach margin of a leg that slides through a fixed point, below which it reverses."""
+FLOW_REFRESH_DISTANCE_MAX = 1e-2
+"""Change of pose (characteristic lengths, matrix entries) after which that map is computed again."""
+REACH_BOUNDARY_MARGIN_FRACTION = 1e-8
+"""Reach margin, as a fraction of that at zero, at which a run slides along the limit of an unobserved leg."""
+FLOW_NEWTON_ERROR_TOL = 1e-6
+"""Norm of the error below which Newton's method finishes a run."""
+FLOW_NEAR, FLOW_CONTRACTED, FLOW_CLEAR = 0.1, 0.125, 0.1
+"""Error from which full Newton steps are tried, their contraction, and the reach margins kept (fractions of those at
+zero)."""
+FLOW_STEPS, FLOW_KEPT = 4_000, 4
+"""Largest number of steps of batched runs, and steps that reuse the slopes of the law."""
 
 GAMMA = 1 / (2 + np.sqrt(2))
 E32 = 6 + np.sqrt(2)

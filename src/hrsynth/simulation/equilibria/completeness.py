@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 
 from ...analysis.observed import ObservedRobot
-from ...budgets import REVERSED_LEG_CHOICES_MAX, ZERO_ERROR_BOXES_MAX
+from ...equations.measured_error import ErrorSystem
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.locked_twists import compute_leg_twists
@@ -18,7 +18,7 @@ from ...kinematics.velocity_relation import ObservationModel
 from ...mechanism.pose import Pose
 from ...progress import report_part
 from ...results import Value
-from ...tolerances import POSITION_BOX_HALF_WIDTH_FRACTION, SLIDING_ROD_LENGTH_MIN
+from ...tolerances import SLIDING_ROD_LENGTH_MIN
 from ..law import directions
 from .critical_poses import CriticalPoses, PoseToJoints
 from .descent import descend, sharpen_points
@@ -32,10 +32,15 @@ from .equilibrium import (
     ProvedCriticalPoint,
     SignedModes,
 )
-from .error import ErrorSystem
-from .exhaustive_search import SubdivisionResult, cover
+from .exhaustive_search import POSITION_BOX_HALF_WIDTH_FRACTION, SubdivisionResult, cover
 from .search import CountedCriticalPoint
 from .subdivision import CriticalBox
+
+ZERO_ERROR_BOXES_MAX = 80_000
+"""Largest number of boxes of poses of three dof in the proof of all zeros of the error; with more dof only on
+request."""
+REVERSED_LEG_CHOICES_MAX = 64
+"""Largest number of choices of reversed legs reported one by one."""
 
 CLOSURE_START_COORDINATES_MAX = 3000
 """Coordinates that are scattered where the robot is to be closed at proved poses, at most."""

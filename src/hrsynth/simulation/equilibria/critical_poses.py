@@ -14,20 +14,9 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...analysis.branch.carried_vectors import CarriedVector, SweptChains
 from ...analysis.observed import ObservedRobot
-from ...budgets import (
-    MIRRORED_RODS_MAX,
-    NEARBY_POSE_STARTS_FRACTION,
-    POSE_CONFIGURATIONS_MAX,
-    POSE_DRAWS_PER_START_COUNT,
-    POSE_LATE,
-    POSE_NEWTON_FRACTION,
-    POSE_QUIET,
-    POSE_ROUNDS,
-    POSE_STARTS,
-)
-from ...closed_forms.legs import OnRod
+from ...equations.carried_vectors import CarriedVector, SweptChains
+from ...equations.measured_error import ErrorSystem
 from ...geometry.so3 import convert_to_quaternions
 from ...geometry.vectors import Array, transform
 from ...kinematics.configuration import ClosedConfiguration
@@ -35,12 +24,26 @@ from ...mechanism.observation import Observation
 from ...mechanism.observations.direction import SeenAxis
 from ...progress import report
 from ...results import Value
-from ...tolerances import CRITICAL_POINT_DISTANCE_TOL, HIDDEN_ROBOT_RESIDUAL_TOL, POSITION_BOX_HALF_WIDTH_FRACTION
+from ...tolerances import CRITICAL_POINT_DISTANCE_TOL, HIDDEN_ROBOT_RESIDUAL_TOL
 from .descent import CriticalPoint, descend
-from .error import ErrorSystem
-from .exhaustive_search import reachable_box
+from .exhaustive_search import POSITION_BOX_HALF_WIDTH_FRACTION, reachable_box
 from .pose_error import EnclosureFailure, PoseError
-from .pose_system import LegSystem, is_free_sliding_rod
+from .pose_system import LegSystem
+
+POSE_STARTS, POSE_ROUNDS = 800, 60
+"""Starts of one round of the search of critical poses with closed-form legs, and rounds per choice of locked legs."""
+NEARBY_POSE_STARTS_FRACTION = 0.6
+"""Fraction of these starts near poses found before."""
+POSE_NEWTON_FRACTION = 0.5
+"""Fraction of the latter that uses Newton's method throughout."""
+POSE_DRAWS_PER_START_COUNT = 16
+"""Largest ratio of poses drawn to poses in reach."""
+POSE_LATE, POSE_QUIET = 0.001, 8
+"""Fraction of the critical poses first found in the last rounds, and their number, at which the search ends."""
+POSE_CONFIGURATIONS_MAX = 12
+"""Nearest configurations from which one at a critical pose is searched."""
+MIRRORED_RODS_MAX = 3
+"""Largest number of rods sliding through a base point with both directions listed at each pose."""
 
 CRITICAL_POSE_STEP_MAX = 0.25
 """Longest change of a coordinate in a step."""
@@ -125,11 +128,11 @@ def _held_sets(error: PoseError) -> list[tuple[int, ...]]:
     """Return the sets of legs that are fixed, the empty set first: unobserved ones at their limits, as E does not
     depend on their distance from it; of observed sliding rods one that is free, as it may be short."""
     watched = {each.limb for each in error.seen}
-    idle = [i for i, limb in enumerate(error.limbs) if i not in watched and isinstance(limb, OnRod)]
+    idle = [i for i, limb in enumerate(error.limbs) if i not in watched and not limb.slides]
     held = [chosen for size in range(min(len(idle), error.size - 1) + 1) for chosen in combinations(idle, size)]
     return [
         (*chosen, *free)
-        for free in ((), *((i,) for i in watched if i is not None and is_free_sliding_rod(error.limbs[i])))
+        for free in ((), *((i,) for i in watched if i is not None and error.limbs[i].is_free))
         for chosen in held
     ]
 

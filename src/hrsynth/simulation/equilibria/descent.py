@@ -15,18 +15,26 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ...budgets import EQUILIBRIUM_COORDINATE_MAX, EQUILIBRIUM_START_STEPS_MAX
+from ...equations.measured_error import CriticalPointEquations, ErrorSystem
 from ...geometry.vectors import Array, times
 from ...results import Value
-from ...tolerances import (
-    COMMAND_DIFFERENCE_STEP_MAX,
-    COMMAND_RATE_CUTOFF_FRACTION,
-    CRITICAL_CURVATURE_TOL,
-    CRITICAL_GRADIENT_TOL,
-    DEPENDENT_EQUATION_TOL,
-    SQUARED_ERROR_ROUNDING_TOL,
-)
-from .error import CriticalPointEquations, ErrorSystem
+
+COMMAND_DIFFERENCE_STEP_MAX = 1e-7
+"""Step (characteristic lengths, radians) of differences of servo commands."""
+COMMAND_RATE_CUTOFF_FRACTION = 1e-10
+"""Relative singular value below which such differences show no rate."""
+CRITICAL_GRADIENT_TOL = 1e-11
+"""Gradient of the error along the loops, and closure residual, at a critical point."""
+DEPENDENT_EQUATION_TOL = 1e-13
+"""Relative squared singular value of the loop equations that a closing step ignores."""
+SQUARED_ERROR_ROUNDING_TOL = 1e-14
+"""½ ‖e‖² below which it is rounding."""
+CRITICAL_CURVATURE_TOL = 1e-7
+"""Curvature of the error below which it counts as zero in the search of critical points."""
+EQUILIBRIUM_START_STEPS_MAX = 80
+"""Steps of one start."""
+EQUILIBRIUM_COORDINATE_MAX = 50.0
+"""Coordinate (characteristic lengths, radians) beyond which a start stops."""
 
 DESCENT_STEP_MAX = 0.25
 """Largest change of a coordinate in a step (characteristic lengths, radians)."""

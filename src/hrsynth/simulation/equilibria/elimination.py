@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...batch.enclosures import BoxFormula, trace_formula
+from ...equations.box_formula import BoxFormula, trace_formula
 from ...geometry.affine import AffineForms, combine
 from ...geometry.vectors import Array
 from ...tolerances import AFFINE_ROUNDING

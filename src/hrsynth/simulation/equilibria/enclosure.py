@@ -24,13 +24,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis.branch.redundant import count_independent_equations
-from ...budgets import TUBE_RADII_COUNT, TUBE_WIDENING_FRACTION
+from ...equations.measured_error import CriticalPointEquations, ErrorSystem
 from ...geometry.affine import AffineForms, combine, make_affine
-from ...geometry.vectors import Array, times
+from ...geometry.vectors import Array
 from ...results import Value
-from ...tolerances import AFFINE_ROUNDING, TUBE_RADIUS_MIN
+from ...solving.krawczyk import bound_contraction, bound_image
+from ...tolerances import AFFINE_ROUNDING, TUBE_RADII_COUNT, TUBE_RADIUS_MIN, TUBE_WIDENING_FRACTION
 from .descent import CriticalPoint, Tangents
-from .error import CriticalPointEquations, ErrorSystem
 
 RATE_WIDTHS = (1e-9, 1e-7, 1e-5, 1e-3, 1e-1)
 """Distances, relative ones where an eigenvalue is above 1, at which bounds of it are tried."""
@@ -114,9 +114,8 @@ def _enclose(system: ErrorSystem, q: Array, idle: int) -> list[EnclosedPoint | N
         inertia, left = np.full(len(q), -1), np.arange(len(q))
         for _ in range(TUBE_RADII_COUNT):
             _, K, _ = evaluated(radius, left)
-            M = (np.eye(known.shape[-1]) - combine(Y[left], K)).size
-            wanted = e[left] + times(M, radius)
-            fits = np.all(wanted * (1 + AFFINE_ROUNDING) < radius, axis=-1)
+            wanted = bound_image(e[left], bound_contraction(Y[left], K), radius)
+            fits = np.all(wanted < radius, axis=-1)
             found[left[fits]], done[left[fits]] = radius[fits], True
             left, radius = left[~fits], (TUBE_WIDENING_FRACTION * np.maximum(wanted, radius))[~fits]
             if not len(left):

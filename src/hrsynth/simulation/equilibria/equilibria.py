@@ -17,15 +17,16 @@ from ...analysis.aspects.leg_forms import LegPattern, build_leg_pattern
 from ...analysis.aspects.path import CLEAR
 from ...analysis.aspects.path_segments import list_path_coordinates
 from ...analysis.aspects.vector_expressions import NoLegForm
-from ...analysis.branch.carried_vectors import SweptChains
 from ...analysis.configuration_report import ConfigurationAnalysis
 from ...analysis.measured import MeasuredRobot
 from ...analysis.modes.modes import AssemblyModes, modes
-from ...analysis.observed import CameraLike, Jobs, LegsLike, ObservedRobot, RobotLike, Seed, SensorLike
+from ...analysis.observation_inputs import CameraLike, Jobs, LegsLike, Seed, SensorLike
+from ...analysis.observed import ObservedRobot, RobotLike
 from ...analysis.pose_requests import solve_configurations
-from ...budgets import SUBDIVISION_BOXES_MAX
 from ...constraints.condition import Condition
 from ...constraints.pattern import ConstraintPattern, list_placing_links
+from ...equations.carried_vectors import SweptChains
+from ...equations.measured_error import ErrorSystem
 from ...errors import HrsynthError, LoopClosureFailure
 from ...geometry.affine import make_affine
 from ...geometry.vectors import Array, compare_poses, sort_rows, transform
@@ -36,23 +37,19 @@ from ...mechanism.observations.direction import SeenAxis
 from ...mechanism.pose import PoseLike, parse_pose
 from ...options import option
 from ...progress import report
-from ...tolerances import (
-    CONTROLLER_DAMPING_MIN,
-    CRITICAL_CURVATURE_TOL,
-    CRITICAL_POINT_DISTANCE_TOL,
-    VISIBLE_SINE_MIN,
-    ZERO_ERROR_TOL,
-)
+from ...tolerances import CONTROLLER_DAMPING_MIN, CRITICAL_POINT_DISTANCE_TOL, SUBDIVISION_BOXES_MAX, VISIBLE_SINE_MIN
 from ..law import Depth, FixedDirections, Law, Measures, measure_all, supposed_planes
 from ..outcome import ANTIPODAL, BOUNDARY, GOAL, MODE, rest
 from ..servo import require_regular, require_seen, require_sight
 from .completeness import CompletenessProof
 from .critical_poses import PoseToJoints, WidenedSearch, critical_poses
-from .descent import descend, walk_at_random
+from .descent import CRITICAL_CURVATURE_TOL, descend, walk_at_random
 from .enclosure import EnclosedPoint, enclose_points
 from .equilibrium import CRITICAL, Equilibria, Equilibrium, SignedModes, stability
-from .error import ErrorSystem
 from .search import CountedCriticalPoint, critical_points, in_mode
+
+ZERO_ERROR_TOL = 1e-8
+"""‖e‖ below which it vanishes at a critical point; cosine below which two directions are perpendicular."""
 
 PROVED_POSE_ROUNDS_COUNT = 3
 """Rounds in which it is tried to close the robot at the proved poses that are not in the list."""
@@ -137,11 +134,10 @@ def equilibria(
     >>> hrsynth.equilibria("rrrrr_m1", goal="x=0,y=0.25").stable[0].kind
     'goal'
     """
-    setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed)
+    asked = [] if goal is None else [parse_pose(goal)]
+    setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed).printing_like(asked)
     if complete:
         setup.by_segments("subdivision")
-    asked = [] if goal is None else [parse_pose(goal)]
-    setup = setup.telling(asked)
     require_seen(setup)
     target = next(iter(solve_configurations(setup, asked)), setup.all_samples.start)
     require_regular(ConfigurationAnalysis.of(setup), "goal", target)
@@ -395,7 +391,7 @@ class EquilibriumSearch:
     @cached_property
     def _condition(self) -> tuple[ConstraintPattern, Condition] | None:
         """The pattern of the held legs and the Type 2 condition, where that has a sign."""
-        seen = MeasuredRobot.of_directions(self.setup)
+        seen = MeasuredRobot.of(self.setup)
         try:
             return (seen.pattern, seen.condition) if seen.condition.signed else None
         except HrsynthError:

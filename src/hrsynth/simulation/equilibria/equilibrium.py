@@ -113,7 +113,8 @@ class SignedModes(Value):
 
     @property
     def is_proved_empty(self) -> bool:
-        """Return True if it is proved that there is no such pose."""
+        """Return True if boxes prove that no pose has zero error with exactly these legs reversed (a translating
+        platform: in the rotations searched)."""
         return self.boxes == 0
 
     modes = Shown(int | None, lambda self: self.boxes if self.listed is None else len(self.listed.modes))
@@ -325,7 +326,7 @@ class Equilibria(Result, shown_as="equilibria"):
 
     complex = Shown(int | None, lambda self: self.lists[0].complex)
     proof = Shown(str, lambda self: self.search.words)
-    attracting_record = Shown(int, lambda self: len(self.stable), As("attracting"))
+    stable_record = Shown(int, lambda self: len(self.stable), As("stable"))
 
 
 def stability(curvatures: Sequence[float] | Array, least: float = CRITICAL_POINT_DISTANCE_TOL) -> str:

@@ -12,8 +12,7 @@ from typing import Annotated
 import numpy as np
 
 from ...analysis.observed import ObservedRobot
-from ...budgets import SUBDIVISION_BOXES_MAX
-from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
+from ...closed_forms.legs import ClosedFormLeg
 from ...geometry.so3 import turn_about
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
@@ -23,21 +22,27 @@ from ...results import Value
 from ...tolerances import (
     CRITICAL_POINT_DISTANCE_TOL,
     HIDDEN_ROBOT_RESIDUAL_TOL,
-    LINEAR_PROGRAM_BOX_TOL,
-    LOCKED_PLACE_EDGE_FRACTION,
-    POSITION_BOX_FRACTION,
-    POSITION_BOX_HALF_WIDTH_FRACTION,
     SINGULAR_BOX_MIN_FRACTION,
     SINGULAR_FINER,
     SLIDING_ROD_LENGTH_MIN,
+    SUBDIVISION_BOXES_MAX,
 )
 from .joint_error import JointError
-from .loop_error import LoopError, LoopSubdivision
+from .loop_error import ForceError, LoopError, LoopSubdivision
 from .points_in_planes_error import PlaneError
 from .pose_error import EnclosureFailure, PoseError
 from .spring_error import SpringError, SpringSubdivision
 from .subdivision import CriticalBox, Subdivision
 from .upu_legs import Struts
+
+POSITION_BOX_HALF_WIDTH_FRACTION = 1.0
+"""Half-width (characteristic lengths) of the box of platform positions if legs give none."""
+POSITION_BOX_FRACTION = 1.25
+"""Extent of the boxes of positions as a multiple of the farthest base point."""
+LINEAR_PROGRAM_BOX_TOL = 1e-6
+"""Margin of linear-program bounds of boxes (characteristic lengths); the programs are solved to 1e-7."""
+LOCKED_PLACE_EDGE_FRACTION = 0.01
+"""Longest edge of a cluster of such boxes, as a fraction of the whole, that is reported as one place."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -65,7 +70,7 @@ class SubdivisionResult(Value):
     unread: Annotated[tuple[str, ...], "legs at whose locked joints nothing was searched"] = ()
     """Spatial legs with joints whose locked poses are unknown; these were not searched."""
 
-    loop: LoopError | SpringError | None = None
+    loop: ForceError | None = None
     """Observed legs, if equilibria were sought by the forces of two or three. Not searched: poses at which an
     unobserved leg is stretched, or at which at least ``flat`` observed directions are at right angles to the desired
     ones."""
@@ -156,8 +161,8 @@ def cover(
     except EnclosureFailure as why:
         return SubdivisionResult((), (), 1.0, 0, False, str(why))
     low, high, bounded = reachable_box(error, reach)
-    charts, endless = [each.list_charts(bounded) for each in families], families[0].is_unbounded
-    loop = next((each for each in families if isinstance(each, LoopError | SpringError)), None)
+    charts, endless = [each.list_charts(bounded) for each in families], len(families[0].charts) > 1
+    loop = next((each for each in families if isinstance(each, ForceError)), None)
     parts = [
         [_boxes(each, low, high, reach, vanishing or loop not in (None, each)) for each in some] for some in charts
     ]
@@ -198,7 +203,7 @@ def cover(
     locked += [(each.x[: error.size], np.maximum(each.radius[: error.size], near)) for each in meeting]
     found = [each for each in found if each not in meeting]
     found = [replace(each, directions=each.directions * own) for own in error.mirrors for each in found]
-    free = [each for i, each in enumerate(error.limbs) if i not in families[0].joints and isinstance(each, SlidingRod)]
+    free = [each for i, each in enumerate(error.limbs) if i not in families[0].joints]
     return SubdivisionResult(
         tuple(found),
         tuple(left),
@@ -261,7 +266,7 @@ def _boxes(error: JointError, low: Array, high: Array, reach: float, vanishing: 
         reach = max(reach, POSITION_BOX_FRACTION * float(ends))
         low, high = np.full(3, -reach), np.full(3, reach)
     corners = error.box(low, high, reach)
-    if isinstance(error, LoopError | SpringError):
+    if isinstance(error, ForceError):
         kind = LoopSubdivision if isinstance(error, LoopError) else SpringSubdivision
         return kind(error, *corners)
     return Subdivision(error, *corners, vanishing)
@@ -360,17 +365,16 @@ def _on_line(zero: CriticalBox, line: PoseError, error: PoseError) -> CriticalBo
 
 
 def reachable_box(error: PoseError, reach: float) -> tuple[Array, Array, bool]:
-    """The box of coordinates that the legs can reach, and whether it is all of it: a rod's tip is no farther from its
-    crank's centre or its rail than its length and the crank's."""
+    """The box of coordinates that the legs can reach, and whether it is all of it."""
     from scipy.optimize import linprog
 
     k = error.shifts.shape[1]
     rows, limits = [], []
     for limb in error.limbs:
-        if not isinstance(limb, OnCrank | OnRail):
+        if limb.reach is None or limb.joint is None:
             continue
-        away = limb.rod + (limb.radius if isinstance(limb, OnCrank) else 0.0) + float(np.linalg.norm(limb.tip.turned))
-        ways = np.eye(3) if isinstance(limb, OnCrank) else np.linalg.svd(limb.axis[None])[2][1:]
+        away = limb.reach + float(np.linalg.norm(limb.tip.turned))
+        ways = np.linalg.svd(limb.joint.axis[None])[2][1:] if limb.joint.start is None else np.eye(3)
         offset = error.p + limb.tip.constant - limb.centre
         for way in (*ways, *-ways):
             rows.append(way @ error.shifts)

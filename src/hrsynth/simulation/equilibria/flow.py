@@ -18,12 +18,16 @@ from numpy.typing import NDArray
 
 from ...batch.configuration_builder import ConfigurationBuilder, compute_rates
 from ...batch.engine import Batch
-from ...closed_forms.legs import ClosedFormLeg, SlidingRod
 from ...geometry.so3 import convert_vectors_to_rotations
 from ...geometry.vectors import Array, cross, hat, solve_definite, times
 from ...kinematics.configuration import ClosedConfiguration
 from ...results import Value
-from ...tolerances import CLOSURE_SOLVER_TOL, CONTROLLER_DAMPING_MIN, FLOW_DAMPING_FRACTION, FLOW_SLOPE_STEP_MAX
+from ...tolerances import CLOSURE_SOLVER_TOL, CONTROLLER_DAMPING_MIN
+
+FLOW_SLOPE_STEP_MAX = 1e-6
+"""Step of the differences of velocities and reach margins of batched runs."""
+FLOW_DAMPING_FRACTION = 3.0
+"""Multiple of ``DAMPED`` below which the map from joints to platform is computed at each step."""
 
 Flags = NDArray[np.bool_]
 Places = NDArray[np.int64]
@@ -79,7 +83,7 @@ class Flow(Value):
     @cached_property
     def points(self) -> Flags:
         """Flags of the legs that slide along a line through a fixed point, at which they reverse: no limit of reach."""
-        return np.array([isinstance(leg, SlidingRod) and not leg.aside for leg in self.batch.legs.values()])
+        return np.array([leg is not None and leg.can_reverse for leg in self.batch.legs.values()])
 
     @cached_property
     def pointed(self) -> Flags:
@@ -181,7 +185,7 @@ class Flow(Value):
             legs = {
                 name: replace(leg, mode=-leg.mode) if bits >> place & 1 else leg
                 for place, (name, leg) in enumerate(self.batch.legs.items())
-                if isinstance(leg, ClosedFormLeg)
+                if leg is not None
             }
             self.modes[bits] = replace(self.placer, batch=replace(self.batch, legs=legs, programs={}))
         return self.modes[bits]

@@ -8,17 +8,26 @@ ball in which that holds, and all end in its middle.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
+from itertools import takewhile
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...batch.enclosures import BoxFormula, trace_formula
-from ...budgets import GOAL_RAYS_COUNT, INWARD_BOXES, RADIUS_AT_ONCE
+from ...equations.box_formula import BoxFormula, trace_formula
 from ...geometry.affine import make_affine, stack
 from ...geometry.vectors import Array
-from ...tolerances import HIDDEN_ROBOT_RESIDUAL_TOL, INWARD_SHARES
-from .cones import ConeProver, proved_all_over
+from ...solving.exhaust import SETTLED, Boxes, Exhaustion
+from ...tolerances import HIDDEN_ROBOT_RESIDUAL_TOL
+from .cones import ConeProver
 from .pose_error import PoseError
+
+INWARD_SHARES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+"""Fractions of that radius for a ball into which the flow points."""
+GOAL_RAYS_COUNT = 3000
+"""Rays from a goal along which the rise of the error is found, not proved."""
+INWARD_BOXES, RADIUS_AT_ONCE = 30_000, 2048
+"""Largest number of boxes in the proof of a ball into which the flow points, and of boxes processed together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,9 +60,9 @@ class InwardProver:
             radius *= 0.8
         return 0.0
 
-    def inwards(self, middle: Array, half: Array) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
-        """Return True for boxes in which all legs reach, J has full rank and runs lead inwards; and the axes along
-        which to cut the others."""
+    def inwards(self, middle: Array, half: Array) -> NDArray[np.intp]:
+        """Return ``SETTLED`` for boxes in which all legs reach, J has full rank and runs lead inwards, for the others
+        the axes across which to cut them."""
         n, count = middle.shape[1], len(middle)
         x = [make_affine(middle[:, i], half[:, i, None] * np.eye(n)[i], np.zeros(count)) for i in range(n)]
         found, limbs = self.rates.jacobian.at(x), len(self.error.limbs)
@@ -94,42 +103,33 @@ class InwardProver:
         proved = reached & (near > doubt) & (near * (near - doubt) * (1 - HIDDEN_ROBOT_RESIDUAL_TOL) > along)
         weights = np.linalg.norm(parts, axis=2).T + half * np.linalg.norm(z, axis=1)[:, None]
         weights = np.where(half > half.max(axis=1)[:, None] / 9, weights + 1e-9 * half, 0.0)
-        return proved, np.argmax(weights, axis=1)
+        return np.where(proved, SETTLED, np.argmax(weights, axis=1))
 
 
-def inward_radius(error: PoseError, seed: int = 0) -> tuple[float, int]:
-    """The radius of a ball |x| ≤ ρ that is proved, as large a part of the one that rays show as boxes allow, and the
-    boxes for it; 0 if none is."""
-    prover, seen, boxes = InwardProver.of(error), _seen_radius(error, seed), 0
-    found = prover.core(seen)
-    for radius in (share * seen for share in INWARD_SHARES if found > 0 and share * seen > found):
-        held, used = _hold_inwards(prover, radius, prover.core(radius))
-        boxes += used
-        if not held:
-            break
-        found = radius
-    return found, boxes
+def inward_radius(error: PoseError, seed: int = 0) -> float:
+    """The radius of a ball |x| ≤ ρ that is proved, as large a part of the one that rays show as boxes allow; 0 if none
+    is."""
+    prover, seen = InwardProver.of(error), _seen_radius(error, seed)
+    core = prover.core(seen)
+    larger = [share * seen for share in INWARD_SHARES if 0 < core < share * seen]
+    return max(takewhile(partial(_is_inward, prover), larger), default=core)
 
 
-def _hold_inwards(prover: InwardProver, radius: float, core: float) -> tuple[bool, int]:
+def _is_inward(prover: InwardProver, radius: float) -> bool:
     """Return True if runs lead inwards all over the ball outside its core, by boxes that are cut where that is not
     proved."""
+    core, n = prover.core(radius), prover.error.size
 
     def inside(middle: Array, half: Array) -> NDArray[np.bool_]:
         near, far = np.maximum(np.abs(middle) - half, 0.0), np.abs(middle) + half
         return (np.linalg.norm(near, axis=1) <= radius) & (np.linalg.norm(far, axis=1) > core)
 
-    def judge(middle: Array, half: Array) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
-        proved, axis = zip(
-            *(
-                prover.inwards(middle[k : k + RADIUS_AT_ONCE], half[k : k + RADIUS_AT_ONCE])
-                for k in range(0, len(middle), RADIUS_AT_ONCE)
-            ),
-            strict=True,
-        )
-        return np.concatenate(proved), np.concatenate(axis)
+    def judge(middle: Array, half: Array) -> Boxes:
+        parts = (slice(k, k + RADIUS_AT_ONCE) for k in range(0, len(middle), RADIUS_AT_ONCE))
+        return middle, half, np.concatenate([prover.inwards(middle[part], half[part]) for part in parts])
 
-    return proved_all_over(np.full(prover.error.size, radius), inside, judge, INWARD_BOXES)
+    start = np.zeros((1, n)), np.full((1, n), radius)
+    return Exhaustion(judge, start, INWARD_BOXES, concerns=inside).run().is_settled
 
 
 def _seen_radius(error: PoseError, seed: int) -> float:

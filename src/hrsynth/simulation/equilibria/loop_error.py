@@ -8,73 +8,75 @@ lie in one plane. In polar coordinates about u₁*, n = cos t u₁* + sin t w(β
 smooth; and with the joints as unknowns, determined by g_j = n · f_j′, nothing is special where n lies along an axis.
 The closure gives u₂, a unit vector in a plane with n and u₂*, with the same |λ|:
 r₁ sin(t − θ) c₂ (u₂* × u₂) = r₂ cos θ sin θ (n × u₂).
+
+Of a 4-R-{2-SS} with legs 1 and 4 observed, 175,542 boxes prove all 51 equilibria in 18 s. Without forces 700,000 boxes
+over the pose prove none in 200 s, and leave 80 % of the space undecided.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from ...batch.enclosures import BoxFormula
-from ...closed_forms.legs import OnCrank, OnRail, SlidingRod
+from ...closed_forms.legs import ClosedFormLeg, LegJoint
+from ...equations.box_formula import BoxFormula
 from ...geometry.affine import AffineForms, stack
 from ...geometry.components import Components, cosine, cross, dot, minus, plus, scale, sine
 from ...geometry.vectors import Array
-from ...tolerances import (
-    CRITICAL_BOX_HALF_EDGE_MIN,
-    EXACT_INCIDENCE_TOL,
-    HIDDEN_ROBOT_RESIDUAL_TOL,
-    POSE_BOX_MIN_FRACTION,
-)
+from ...tolerances import EXACT_INCIDENCE_TOL, HIDDEN_ROBOT_RESIDUAL_TOL
 from .elimination import Flags, Places, away, pivots
-from .joint_bounds import narrow_joint as joint_bounds
-from .joint_error import JointError, across, of_robot
+from .joint_error import JointError, of_robot
 from .pose_error import EnclosureFailure, Number, PoseError
-from .subdivision import CriticalBox, Subdivision, forms_of, hull
+from .subdivision import CRITICAL_BOX_HALF_EDGE_MIN, POSE_BOX_MIN_FRACTION, CriticalBox, Subdivision, forms_of, hull
 
 ZERO_NARROWINGS_COUNT = 16
 """Number of times that the place of a zero is narrowed."""
 
 
-@dataclass(frozen=True, eq=False)
-class Term:
-    """Contribution of a joint to the closure: ``size`` times a unit vector at right angles to ``axis`` that rotates
-    from ``one``, or ``size`` times its travel along ``axis`` if that is None."""
+@dataclass(frozen=True, eq=False, repr=False)
+class ForceError(JointError):
+    """Equations of forces that balance, beside g, in the place of the gradient of E."""
 
-    size: float
-    axis: Array
-    one: Array | None = None
+    @property
+    def flat(self) -> int:
+        """Number of observed directions at right angles to the desired ones at which equilibria are not searched."""
+        return 1
 
-    def at(self, z: Any, number: Number) -> tuple[Components, Components]:
-        """f and the unit vector along its rate."""
-        if self.one is None:
-            return scale(z, number(self.size * self.axis)), number(self.axis)
-        one, two, c, s = self.one, np.cross(self.axis, self.one), cosine(z), sine(z)
-        return (
-            plus(scale(c, number(self.size * one)), scale(s, number(self.size * two))),
-            minus(scale(c, number(two)), scale(s, number(one))),
-        )
+    def rest(self, y: Sequence[Any], number: Number) -> list[Any]:
+        """Return the equations beside g."""
+        raise NotImplementedError
+
+    @cached_property
+    def left(self) -> BoxFormula:
+        """Equations beside g."""
+        return of_robot(self.rest, self.size[0])
+
+    @cached_property
+    def bends(self) -> BoxFormula:
+        """The rates of all equations, one after the other."""
+
+        def formula(y: Sequence[Any], known: Number) -> list[Any]:
+            x, number = self.unknowns(y, range(self.size[0])), self.make_constant(known)
+            return [rate for each in (*self.close(x, number), *self.rest(x, number)) for rate in each.rates]
+
+        return of_robot(formula, self.size[0])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LoopError(JointError):
+class LoopError(ForceError):
     """Equations over β (in space), t, θ and the joints of the terms; ``joints`` are the observed legs."""
 
     @classmethod
     def about(cls, error: PoseError) -> LoopError:
         """Build the equations of a pose's error; raises ``EnclosureFailure`` if it is not that of such a loop."""
         joints = tuple(each.limb for each in error.seen if each.limb is not None)
-        if (
-            len(error.seen) != 2
-            or len(set(joints)) != 2
-            or not all(isinstance(error.limbs[i], OnCrank | OnRail) for i in joints)
-        ):
-            raise EnclosureFailure("the observed legs are not two rods of constant length")
         found = cls(error, joints, error, shortest=0.0)
+        if len(error.seen) != 2 or len(set(joints)) != 2 or len(found.rods) != 2:
+            raise EnclosureFailure("the observed legs are not two rods of constant length")
         if error.turns.shape[1] > 1 or any(abs(each.size) < EXACT_INCIDENCE_TOL for each in found.terms):
             raise EnclosureFailure("the observed legs do not determine the platform's rotation")
         if error.shifts.shape[1] == 2:
@@ -82,7 +84,7 @@ class LoopError(JointError):
             off = [
                 *(normal @ each for each in found.desired),
                 *(
-                    np.linalg.norm(np.cross(normal, each.axis)) if each.one is not None else normal @ each.axis
+                    np.linalg.norm(np.cross(normal, each.axis)) if each.start is not None else normal @ each.axis
                     for each in found.terms
                 ),
             ]
@@ -91,6 +93,11 @@ class LoopError(JointError):
         ):
             raise EnclosureFailure("the motion is neither planar nor spatial")
         return found
+
+    @cached_property
+    def rods(self) -> list[ClosedFormLeg]:
+        """Observed legs that are rods of constant length."""
+        return [limb for i in self.joints if not (limb := self.error.limbs[i]).slides]
 
     @cached_property
     def over_pose(self) -> JointError:
@@ -109,33 +116,26 @@ class LoopError(JointError):
         return [np.array(each) for each in self.wanted]
 
     @cached_property
-    def terms(self) -> list[Term]:
+    def terms(self) -> list[LegJoint]:
         """Terms of the cranks or sliders, and of the platform's rotation."""
-        found, error = list[Term](), self.error
-        for sign, i in zip((1.0, -1.0), self.joints, strict=True):
-            limb = error.limbs[i]
-            assert isinstance(limb, OnCrank | OnRail)
-            found.append(
-                Term(sign * limb.radius, limb.axis, across(limb)[0])
-                if isinstance(limb, OnCrank)
-                else Term(sign, limb.axis)
-            )
+        error = self.error
+        found = [replace(joint, size=sign * joint.size) for sign, joint in zip((1.0, -1.0), self.feet, strict=True)]
         for axis in error.turns.T:
             arm = self._arm - axis * (axis @ self._arm)
             size = float(np.linalg.norm(arm))
-            found.append(Term(-size, axis, arm / size if size else arm))
+            found.append(LegJoint(axis, arm / size if size else arm, -size))
         return found
 
     @property
     def _arm(self) -> Array:
         """Vector from the second tip to the first at the goal, as far as it rotates."""
-        one, two = (self.error.limbs[i].tip.turned for i in self.joints)
+        one, two = (each.tip.turned for each in self.rods)
         return np.asarray(self.error.R @ (one - two))
 
     @property
     def _still(self) -> Array:
         """k."""
-        one, two = (self.error.limbs[i] for i in self.joints)
+        one, two = self.rods
         axes = self.error.turns
         still = self._arm if not axes.shape[1] else axes @ (axes.T @ self._arm)
         return np.asarray(one.centre - one.tip.constant - two.centre + two.tip.constant - still)
@@ -159,9 +159,7 @@ class LoopError(JointError):
 
     def vectors(self, y: Sequence[Any], number: Number) -> tuple[list[Components], list[Any]]:
         """n, u₁ and u₂; and g."""
-        one, two = (self.error.limbs[i] for i in self.joints)
-        assert isinstance(one, OnCrank | OnRail)
-        assert isinstance(two, OnCrank | OnRail)
+        one, two = self.rods
         u, m = self.desired[0], self.freedoms
         first = np.linalg.svd(u[None])[2][1] if m == 3 else np.cross(np.cross(*self.error.shifts.T), u)
         w = (
@@ -172,16 +170,14 @@ class LoopError(JointError):
         n, rod = (plus(scale(cosine(z), number(u)), scale(sine(z), w)) for z in y[m - 2 : m])
         tip, g = plus(scale(number(one.rod), rod), number(self._still)), list[Any]()
         for z, term in zip(y[m:], self.terms, strict=True):
-            f, rate = term.at(z, number)
+            f, rate = term.carry(z, number)
             tip = plus(tip, f)
             g.append(dot(n, rate))
         return [n, rod, scale(number(1 / two.rod), tip)], g
 
     def rest(self, y: Sequence[Any], number: Number) -> list[Any]:
         """Return the equations beside g: the length of u₂; the force, across u₂; in space the plane of u₂."""
-        one, two = (self.error.limbs[i] for i in self.joints)
-        assert isinstance(one, OnCrank | OnRail)
-        assert isinstance(two, OnCrank | OnRail)
+        one, two = self.rods
         (n, _, u), _ = self.vectors(y, number)
         t, theta = y[self.freedoms - 2 : self.freedoms]
         wanted, across_u = number(self.desired[1]), cross(n, u)
@@ -194,14 +190,12 @@ class LoopError(JointError):
             return [length, dot(force, number(np.cross(*self.error.shifts.T)))]
         return [length, *force, dot(across_u, wanted)]
 
-    @cached_property
-    def closing(self) -> BoxFormula:
-        return of_robot(lambda y, number: self.vectors(y, number)[1], self.size[0])
+    def close(self, y: Sequence[Any], number: Number) -> list[Any]:
+        return self.vectors(y, number)[1]
 
-    @cached_property
-    def left(self) -> BoxFormula:
-        """Equations beside g."""
-        return of_robot(self.rest, self.size[0])
+    @property
+    def rotates(self) -> list[bool | None]:
+        return [None if each.start is None else True for each in self.terms]
 
     @cached_property
     def slips(self) -> BoxFormula:
@@ -214,42 +208,16 @@ class LoopError(JointError):
         return of_robot(formula, self.size[0])
 
     @cached_property
-    def bends(self) -> BoxFormula:
-        """The rates of all equations, one after the other."""
-
-        def formula(y: Sequence[Any], known: Number) -> list[Any]:
-            x, number = self.unknowns(y, range(self.size[0])), self.make_constant(known)
-            return [rate for each in (*self.vectors(x, number)[1], *self.rest(x, number)) for rate in each.rates]
-
-        return of_robot(formula, self.size[0])
-
-    @cached_property
-    def ways(self) -> BoxFormula:
-        """Vectors of each rotating joint: n along its axis and across it."""
-
-        def formula(y: Sequence[Any], number: Number) -> list[Any]:
-            n = self.vectors([*y, *(0.0 for _ in self.terms)], number)[0][0]
-            return [
-                dot(n, number(way))
-                for each in self.terms
-                if each.one is not None
-                for way in (each.axis, each.one, np.cross(each.axis, each.one))
-            ]
-
-        return of_robot(formula, self.freedoms)
-
-    @cached_property
     def told(self) -> BoxFormula:
         """Coordinates about the goal: shifts, the rotation, the joints of the observed legs."""
 
         def formula(y: Sequence[Any], number: Number) -> list[Any]:
             error, m = self.error, self.freedoms
-            limb = error.limbs[self.joints[0]]
-            assert isinstance(limb, OnCrank | OnRail)
+            limb = self.rods[0]
             rod = self.vectors(y, number)[0][1]
             point = plus(
                 number(limb.centre - limb.tip.constant - error.p),
-                plus(scale(number(limb.rod), rod), self.terms[0].at(y[m], number)[0]),
+                plus(scale(number(limb.rod), rod), self.terms[0].carry(y[m], number)[0]),
             )
             arm = error.R @ limb.tip.turned
             for axis, z in zip(error.turns.T, y[m + 2 :], strict=True):
@@ -273,16 +241,6 @@ class LoopSubdivision(Subdivision):
     there is one is proved over the pose."""
 
     error: LoopError
-
-    def _narrow(self, middle: Array, half: Array) -> tuple[Array, Array]:
-        low, high, m = middle - half, middle + half, self.error.freedoms
-        ways = self.error.ways.at(forms_of(middle, half)[:m])
-        turning = [k for k, each in enumerate(self.error.terms, m) if each.one is not None]
-        for k, i in enumerate(turning):
-            along, one, two = ((each.low, each.high) for each in ways[3 * k : 3 * k + 3])
-            rod = SlidingRod("", axis=self.error.terms[i - m].axis)
-            low[:, i], high[:, i] = joint_bounds(rod, along, one, two, (low[:, i], high[:, i]))
-        return low, high
 
     def _settle(self, tube: list[AffineForms], P: Places, N: Places) -> tuple[Flags, AffineForms]:
         F = self.error.left.together(tube)

@@ -10,7 +10,7 @@ from ...geometry.vectors import Array, compare_poses
 from ...results import Value
 from ...tolerances import RUN_END_DIFFERENCE_TOL
 from ..outcome import BOUNDARY, RunOutcome
-from .attraction_radius import CertifiedRadius
+from .attraction_radius import AttractionRadius
 from .flow import Flags, Places
 
 
@@ -44,7 +44,7 @@ class OutcomeCount:
     followed: int = 0
     checked: int = 0
     agreed: int = 0
-    certified: CertifiedRadius | None = None
+    certified: AttractionRadius | None = None
 
 
 class Outcomes:

@@ -9,6 +9,8 @@ equation more. Where families meet, what is critical in one need not be so in th
 
 Coordinates: s, the components of q along a basis of a family but one, which is 1, and the joints as in
 :mod:`.joint_error`. Charts with each of the components as 1, the others between −1 and 1, together hold all turns.
+
+Without planes such a platform is not searched. Of the 3-RPS, 202,948 boxes prove 288 of its 320 equilibria in 24 s.
 """
 
 from __future__ import annotations
@@ -23,8 +25,7 @@ import numpy as np
 from ...analysis.aspects.path_segments import PathCoordinates
 from ...analysis.aspects.vector_expressions import NoLegForm
 from ...analysis.observed import ObservedRobot
-from ...batch.enclosures import BoxFormula, trace_formula
-from ...closed_forms.legs import SlidingRod
+from ...equations.box_formula import BoxFormula, trace_formula
 from ...geometry.affine import make_affine, stack
 from ...geometry.components import Components, combine_columns, cross, plus, scale
 from ...geometry.duals import Dual
@@ -75,17 +76,14 @@ class PlaneError(JointError):
         except NoLegForm as why:
             raise EnclosureFailure(str(why)) from why
         if [str(limb.label) for limb in error.limbs] != [leg.label for leg in legs] or not all(
-            isinstance(limb, SlidingRod) for limb in error.limbs
+            limb.slides for limb in error.limbs
         ):
             raise depends
         N, places = np.array(normals), coordinates.of([goal, *configurations])
         h = [limb.tip.value(*places) @ n for limb, n in zip(error.limbs, N, strict=True)]
         if max(map(np.ptp, h)) > HIDDEN_ROBOT_RESIDUAL_TOL:
             raise depends
-        limbs = tuple(
-            replace(limb, axis=n) if isinstance(limb, SlidingRod) and limb.axis is None else limb
-            for limb, n in zip(error.limbs, N, strict=True)
-        )
+        limbs = tuple(limb.turning_about(n) for limb, n in zip(error.limbs, N, strict=True))
         whole = JointError.of(replace(error, limbs=limbs))
         if len(whole.joints) < len(limbs):
             raise depends
@@ -133,6 +131,10 @@ class PlaneError(JointError):
         return np.zeros((0, 3))
 
     @property
+    def shifts(self) -> Array:
+        return self.along
+
+    @property
     def freedoms(self) -> int:
         return int(self.along.shape[1] + self.span.shape[1]) - 1
 
@@ -155,26 +157,12 @@ class PlaneError(JointError):
         turns = np.ones(self.freedoms - k)
         return (np.concatenate([middle - room, -turns, inner[6:]]), np.concatenate([middle + room, turns, outer[6:]]))
 
-    def _place_platform(
-        self, y: Sequence[Any], known: Number, number: Number
-    ) -> tuple[Dual, Components, list[Dual], list[Dual]]:
-        k, x = self.along.shape[1], self.unknowns(y, range(self.freedoms))
-        w, place = number(1.0), list(x[:k])
-        if self.far is not None:
-            w, place[self.far] = x[self.far], w
-        turned = [self._times(w, each) for each in self._rotation(x[k:], number)]
-        point = plus(scale(w, number(self.offset)), combine_columns(turned, self.follow, number))
-        return w, plus(point, combine_columns(place, self.along, number)) if k else point, turned, []
+    def _place_platform(self, y: Sequence[Any], number: Number) -> tuple[Dual, Components, list[Dual], list[Dual]]:
+        w, point, turned, u = super()._place_platform(y, number)
+        point = plus(plus(scale(w, number(self.offset)), combine_columns(turned, self.follow, number)), point)
+        return w, point, turned, u
 
-    def _times(self, w: Dual, turned: Dual) -> Dual:
-        """w times what turns alone decide; far away with rates by these over w."""
-        if self.far is None:
-            return turned
-        rates = list(turned.rates)
-        rates[self.far] = turned.value
-        return Dual(w.value * turned.value, rates)
-
-    def _rotation(self, x: Sequence[Dual], number: Number) -> list[Dual]:
+    def _rotate(self, x: Sequence[Dual], number: Number) -> list[Dual]:
         """R by rows, of the components but that which is 1."""
         r = self.span.shape[1]
         q = [*x[: self.one], number(1.0), *x[self.one :]]
@@ -211,9 +199,9 @@ class PlaneError(JointError):
 
         def formula(y: Sequence[Any], known: Number) -> list[Any]:
             number = self.make_constant(known)
-            w, point, _, _ = self._place_platform(y, known, number)
+            w, point, _, _ = self._place_platform(y, number)
             k = self.along.shape[1]
-            R = self._rotation([Dual(each, [0.0] * self.size[0]) for each in y[k : self.freedoms]], number)
+            R = self._rotate([Dual(each, [0.0] * self.size[0]) for each in y[k : self.freedoms]], number)
             turn = [cross(number(self.error.R[:, j]), [R[3 * i + j] for i in range(3)]) for j in range(3)]
             axis = scale(0.5, plus(plus(turn[0], turn[1]), turn[2]))
             return [each.value for each in (w, *point, *axis)]

@@ -21,7 +21,7 @@ from ...analysis.aspects.leg_forms import LegPattern, build_leg_pattern
 from ...analysis.aspects.path_segments import PathCoordinates, list_path_coordinates
 from ...analysis.aspects.vector_expressions import JointRules, NoLegForm
 from ...analysis.observed import ObservedRobot
-from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, OnRod, SlidingRod
+from ...closed_forms.legs import ClosedFormLeg
 from ...closed_forms.platform_points import PlatformPoint, platform_point
 from ...constraints.named_vectors import BodyVector, NamedVector, collect_poses
 from ...geometry.components import (
@@ -34,7 +34,6 @@ from ...geometry.components import (
     plus,
     scale,
     spin,
-    sqrt,
     transform_vector,
 )
 from ...geometry.vectors import Array
@@ -164,7 +163,7 @@ class PoseError(Value):
             (limb, carried)
             for limb, carried in zip(known.forms(goal).subchains, known.carried, strict=True)
             if not (
-                isinstance(limb, OnRail)
+                not limb.slides
                 and limb.rod <= EXACT_INCIDENCE_TOL
                 and motion.translations.shape[1] == 1
                 and not np.any(limb.tip.turned)
@@ -206,11 +205,7 @@ class PoseError(Value):
     def mirrors(self) -> Array:
         """Signs (2ᵏ, legs, 1) of the observed directions under which E is the same at a pose, all 1 first: a rod that
         slides through a base point has its direction either way."""
-        both = [
-            k
-            for k, each in enumerate(self.seen)
-            if each.limb is not None and isinstance(leg := self.limbs[each.limb], SlidingRod) and leg.aside == 0
-        ]
+        both = [k for k, each in enumerate(self.seen) if each.limb is not None and self.limbs[each.limb].can_reverse]
         signs = np.ones((2 ** len(both), len(self.seen), 1))
         signs[:, both, 0] = list(product((1.0, -1.0), repeat=len(both)))
         return signs
@@ -261,24 +256,17 @@ class PoseError(Value):
         self, seen: ObservedDirection, here: Place, goal: Place, twists: Sequence[Twist], number: Number
     ) -> RotatingDirection:
         """An observed direction, and how it changes with twists of the platform's point."""
-        wanted, u = self._direction(seen, *goal, number), self._direction(seen, *here, number)
+        wanted = self._direction(seen, *goal, number)
         if seen.limb is None:
+            u = self._direction(seen, *here, number)
             plain = [[0.0, 0.0, 0.0] if each.w is None else cross(each.w, u) for each in twists]
             return RotatingDirection(u, wanted, plain, [0.0] * len(twists), u, 1.0)
         limb = self.limbs[seen.limb]
         tip, arm = self._tip(limb, *here, number)
-        margin, carried = limb.at(tip, number, limb.mode)
+        at = limb.observe(tip, number, seen.sense)
         tips = [each.v if each.w is None else plus(each.v, cross(each.w, arm)) for each in twists]
-        if isinstance(limb, OnRod):
-            gain, axis = seen.sense / number(limb.rod), number(limb.axis)
-            slip = cross(axis, minus(carried, number(limb.centre))) if isinstance(limb, OnCrank) else axis
-            # t · u, which is ∓ √margin / rod
-            along = (-limb.mode) * (gain * sqrt(margin))
-        else:
-            gain, slip, along = (seen.sense * limb.mode) / sqrt(margin), u, 1.0
-        return RotatingDirection(
-            u, wanted, [scale(gain, y) for y in tips], [gain * dot(u, y) for y in tips], slip, along
-        )
+        plain, normal = [scale(at.gain, y) for y in tips], [at.gain * dot(at.u, y) for y in tips]
+        return RotatingDirection(at.u, wanted, plain, normal, at.slip, at.along)
 
     def _direction(self, seen: ObservedDirection, p: Components, R: Components, number: Number) -> Components:
         """Return an observed direction at a pose, in its leg's working mode."""
@@ -286,13 +274,7 @@ class PoseError(Value):
             return plus(transform_vector(R, number(seen.rule.turned)), number(seen.rule.constant))
         assert seen.limb is not None
         limb = self.limbs[seen.limb]
-        tip = self._tip(limb, p, R, number)[0]
-        carried = limb.at(tip, number, limb.mode)[1]
-        return (
-            scale(seen.sense / number(limb.rod), minus(tip, carried))
-            if isinstance(limb, OnRod)
-            else scale(seen.sense, carried)
-        )
+        return limb.observe(self._tip(limb, p, R, number)[0], number, seen.sense).u
 
 
 def require_directions(setup: ObservedRobot) -> None:
@@ -320,10 +302,8 @@ def _seen_direction(
     u = feature.value(collect_poses(configurations, feature.links))
     p, R = known.coordinates.of(configurations)
     for i, (limb, carried) in enumerate(pairs):
-        if not isinstance(limb, OnRod | SlidingRod):
-            continue
         held = carried.value(collect_poses(configurations, carried.links))
-        rods = (limb.tip.value(p, R) - held) / limb.rod if isinstance(limb, OnRod) else held
+        rods = np.array(limb.along(limb.tip.value(p, R), held)) / (limb.rod or 1.0)
         for sense in (1.0, -1.0):
             if np.max(np.abs(u - sense * rods)) < HIDDEN_ROBOT_RESIDUAL_TOL:
                 return ObservedDirection(observation.leg, sense, i)

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRod, SlidingRod
+from ...closed_forms.legs import ClosedFormLeg
 from ...geometry.vectors import Array, hat
 from ...results import Value
 from ...tolerances import CRITICAL_POINT_DISTANCE_TOL
@@ -57,34 +57,11 @@ class Piece(Value):
     @property
     def is_free_rod(self) -> bool:
         """Return True if it is a rod with its own length and direction."""
-        return self.held and self.limb is not None and is_free_sliding_rod(self.limb)
+        return self.held and self.limb is not None and self.limb.is_free
 
     def own(self, y: Array) -> Array:
         """Coordinates of the leg (c, j)."""
         return y[:, self.place or slice(0)]
-
-    @cached_property
-    def frame(self) -> tuple[Array, Array]:
-        """Two directions across the axis of the joint."""
-        assert isinstance(self.limb, OnCrank | SlidingRod)
-        assert self.limb.axis is not None
-        one = np.linalg.svd(self.limb.axis[None])[2][1]
-        return one, np.cross(self.limb.axis, one)
-
-    def ring(self, o: Array) -> tuple[Array, Array]:
-        """The unit vector (c, 3) at θ (c, 1) and its derivative."""
-        one, two = self.frame
-        c, s = np.cos(o), np.sin(o)
-        return c * one + s * two, c * two - s * one
-
-    def start(self, o: Array) -> tuple[Array, Array, Array]:
-        """The rod's start B and two derivatives, (c, 3), of a crank or a slider."""
-        limb = self.limb
-        assert isinstance(limb, OnRod)
-        if isinstance(limb, OnCrank):
-            spoke, rate = (limb.radius * each for each in self.ring(o))
-            return limb.centre + spoke, rate, -spoke
-        return limb.centre + o * limb.axis, limb.axis + 0 * o, 0 * o * limb.axis
 
     def direction(self, t: Array, o: Array) -> Array:
         """The observed direction (c, 3)."""
@@ -92,12 +69,11 @@ class Piece(Value):
         limb, sense = self.limb, self.seen.sense
         if limb is None:
             return t
-        if isinstance(limb, OnRod):
-            return sense / limb.rod * (t - self.start(o)[0])
         if self.is_free_rod:
             return sense * o[:, 1:]
-        if self.place is not None:
-            return sense * self.ring(o)[0]
+        if not limb.is_free:
+            carried = limb.carry(o)[0]
+            return sense / (limb.rod or 1.0) * (carried if limb.slides else t - carried)
         way = t - limb.centre
         return sense * limb.mode * way / np.linalg.norm(way, axis=1)[:, None]
 
@@ -109,14 +85,12 @@ class Piece(Value):
         c = u @ w
         if limb is None:
             return LocalDerivatives(c, w + 0 * t)
-        if isinstance(limb, OnRod):
-            k = sense / limb.rod
-            _, rate, bend = self.start(o)
-            return LocalDerivatives(c, k * w + 0 * t, -k * (rate @ w), None, None, -k * (bend @ w))
         if self.is_free_rod:
             return LocalDerivatives(c, 0 * t, sense * np.append(0.0, w) + 0 * o, None, None, np.zeros((4, 4)))
-        if self.place is not None:
-            return LocalDerivatives(c, 0 * t, sense * (self.ring(o)[1] @ w), None, None, -c)
+        if not limb.is_free:
+            k, (_, rate, bend, _) = sense / (limb.rod or 1.0), limb.carry(o)
+            by_tip, own = (0.0, k) if limb.slides else (k, -k)
+            return LocalDerivatives(c, by_tip * w + 0 * t, own * (rate @ w), None, None, own * (bend @ w))
         size = np.linalg.norm(t - limb.centre, axis=1)[:, None]
         u = sense * limb.mode * u
         c = sense * limb.mode * c
@@ -130,10 +104,9 @@ class Piece(Value):
     def equations(self, t: Array, o: Array) -> list[LocalDerivatives]:
         """Return the equations, which vanish at a solution."""
         limb = self.limb
-        if self.place is None:
+        if self.place is None or limb is None:
             return []
         if self.is_free_rod:
-            assert limb is not None
             s, u, eye = o[:, :1], o[:, 1:], np.eye(4)
             found = [
                 LocalDerivatives(
@@ -152,29 +125,21 @@ class Piece(Value):
                 for k, (x, axis) in enumerate(zip((t - limb.centre - s * u).T, np.eye(3), strict=True))
             ]
             return found
-        if isinstance(limb, SlidingRod):
-            u, q = self.ring(o)
+        B, rate, bend, third = limb.carry(o)
+        if limb.slides:
             way = t - limb.centre
-            return [LocalDerivatives(_dot(way, q) - limb.aside, q, -_dot(way, u), None, -u, -_dot(way, q))]
-        assert isinstance(limb, OnRod)
-        B, rate, bend = self.start(o)
+            return [LocalDerivatives(_dot(way, rate) - limb.aside, rate, _dot(way, bend), None, bend, -_dot(way, rate))]
         v, size = t - B, _dot(rate, rate)
         found = [
             LocalDerivatives((_dot(v, v) - limb.rod**2) / 2, v, -_dot(v, rate), np.eye(3), -rate, size - _dot(v, bend))
         ]
         if self.held:
-            third = -rate if isinstance(limb, OnCrank) else 0 * rate
             found.append(
                 LocalDerivatives(
                     _dot(v, rate), rate, _dot(v, bend) - size, None, bend, _dot(v, third) - 3 * _dot(rate, bend)
                 )
             )
         return found
-
-
-def is_free_sliding_rod(limb: ClosedFormLeg) -> bool:
-    """Return True if it is a rod that slides through a base point and rotates freely."""
-    return isinstance(limb, SlidingRod) and limb.axis is None
 
 
 def _dot(a: Array, b: Array) -> Array:
@@ -205,8 +170,8 @@ class LegSystem(Value):
             limb = None if i is None else error.limbs[i]
             point = seen.rule if limb is None and seen is not None else limb.tip if limb is not None else None
             assert point is not None
-            free = i in held and limb is not None and is_free_sliding_rod(limb)
-            joint = 4 if free else int(limb is not None and not is_free_sliding_rod(limb))
+            free = i in held and limb is not None and limb.is_free
+            joint = 4 if free else int(limb is not None and not limb.is_free)
             wanted = np.zeros(3) if seen is None else np.array(error._direction(seen, *goal, lambda value: value))
             pieces.append(
                 Piece(
@@ -297,18 +262,18 @@ class LegSystem(Value):
     def about_legs(self, x: Array, reach: float, rng: np.random.Generator) -> Array:
         """Coordinates of poses (n, k) so that a random leg's joint is anywhere (a slider within ``reach``), and its rod
         has any direction, one that slides any length, often a short one; the turn is kept."""
-        legs = self.free or [each for each in self.pieces if isinstance(each.limb, OnRod | SlidingRod)]
+        legs = self.free or [each for each in self.pieces if each.limb is not None]
         x, k = x.copy(), self.quaternion.start
         x[:, self.quaternion] /= np.maximum(np.linalg.norm(x[:, self.quaternion], axis=1, keepdims=True), 1e-300)
         for some, piece in zip(np.array_split(np.arange(len(x)), max(len(legs), 1)), legs, strict=False):
             limb, o = piece.limb, rng.uniform(-1, 1, (len(some), 1))
             way = rng.normal(size=(len(some), k)) @ self.error.shifts.T
             way /= np.linalg.norm(way, axis=1)[:, None]
-            if isinstance(limb, OnRod):
-                tip = piece.start(o * (np.pi if isinstance(limb, OnCrank) else reach))[0] + limb.rod * way
-            else:
-                assert limb is not None
+            assert limb is not None
+            if limb.slides:
                 tip = limb.centre + reach * o**3 * way
+            else:
+                tip = limb.carry(o * (np.pi if limb.radius else reach))[0] + limb.rod * way
             x[some, :k] += (tip - self.tip(piece, x[some])) @ self.error.shifts
         return x
 
@@ -334,14 +299,11 @@ class LegSystem(Value):
                 with np.errstate(invalid="ignore", divide="ignore"):
                     margin, carried = limb.at(list(tip.T), lambda value: value, rng.choice([-1.0, 1.0], count))
                 good &= margin > 0
-                way = np.array(carried).T - (limb.centre if isinstance(limb, OnRod) else 0.0)
-            if isinstance(limb, OnCrank | SlidingRod):
-                one, two = piece.frame
-                o = np.arctan2(way @ two, way @ one)
-                y[:, piece.place.start] = o + np.pi * rng.integers(2, size=count) if piece.held else o
-            else:
-                assert isinstance(limb, OnRod)
-                y[:, piece.place.start] = way @ limb.axis
+                way = np.array(carried).T - (0.0 if limb.slides else limb.centre)
+            assert limb.joint is not None
+            y[:, piece.place.start] = limb.joint.locate(way)
+            if piece.held and limb.radius:
+                y[:, piece.place.start] += np.pi * rng.integers(2, size=count)
         return y[good & self.is_reached(y)]
 
 

@@ -10,21 +10,10 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from ...analysis.branch.carried_vectors import SweptChains
-from ...analysis.observed import ObservedRobot, restrict_samples
-from ...budgets import (
-    ENDING_DESCENTS,
-    ENDING_LEAST,
-    EQUILIBRIUM_COORDINATE_MAX,
-    EQUILIBRIUM_COORDINATES_MAX,
-    EQUILIBRIUM_ROUNDS_MAX,
-    EQUILIBRIUM_STARTS_COUNT,
-    EQUILIBRIUM_WALK_STEPS_COUNT,
-    JOINT_ROUNDS_FRACTION,
-    LATE_EQUILIBRIA_FRACTION,
-    LATE_STABLE_EQUILIBRIA_FRACTION,
-)
+from ...analysis.observed import ObservedRobot
 from ...constraints.pattern import list_placing_links
+from ...equations.carried_vectors import SweptChains
+from ...equations.measured_error import CriticalPointEquations, DirectionTerm, ErrorSystem
 from ...errors import LoopClosureFailure
 from ...geometry.vectors import Array, times
 from ...kinematics.assembly import build_from_link_poses
@@ -36,15 +25,36 @@ from ...mechanism.observation import Observation
 from ...mechanism.observations.direction import SeenAxis
 from ...progress import report
 from ...results import Value
-from ...tolerances import (
-    CLOSURE_CROSSING_VALUE_TOL,
-    CRITICAL_CURVATURE_TOL,
-    CRITICAL_POINT_DISTANCE_TOL,
-    VISIBLE_SINE_MIN,
-)
+from ...tolerances import CRITICAL_POINT_DISTANCE_TOL, VISIBLE_SINE_MIN
 from ..law import Law
-from .descent import CriticalPoint, are_closed, close_loops, descend, walk_at_random
-from .error import CriticalPointEquations, DirectionTerm, ErrorSystem
+from .descent import (
+    CRITICAL_CURVATURE_TOL,
+    EQUILIBRIUM_COORDINATE_MAX,
+    CriticalPoint,
+    are_closed,
+    close_loops,
+    descend,
+    walk_at_random,
+)
+
+CLOSURE_CROSSING_VALUE_TOL = 1e-6
+"""Relative singular value of the loop equations below which closures meet; largest slope of E along that motion."""
+EQUILIBRIUM_STARTS_COUNT = 200
+"""Starts of one round of the search of critical points."""
+EQUILIBRIUM_ROUNDS_MAX = 12
+"""Largest number of rounds for robots with many coordinates."""
+EQUILIBRIUM_COORDINATES_MAX = 300
+"""Sum of coordinates over all rounds up to which robots with few coordinates have more rounds."""
+ENDING_DESCENTS, ENDING_LEAST = 3, 7
+"""Least number of rounds when only stable equilibria are searched, and when all are."""
+LATE_EQUILIBRIA_FRACTION = 0.005
+"""Fraction of the critical points first found by the later half of the starts at which the search ends."""
+LATE_STABLE_EQUILIBRIA_FRACTION = 0.02
+"""The same fraction when only stable equilibria are searched."""
+EQUILIBRIUM_WALK_STEPS_COUNT = 6
+"""Random steps along the loops between the starts of two rounds."""
+JOINT_ROUNDS_FRACTION = 0.17
+"""Fraction of joint-space rounds that remains if critical poses are searched as well."""
 
 NEARBY_STARTS_FRACTION = 0.5
 """Factor for the number of starts a few random steps beside equilibria already found, if there are no closed forms."""
@@ -353,6 +363,5 @@ def told_by(setup: ObservedRobot) -> tuple[Observation, ...]:
     return tuple(
         o
         for o in every.observation_model.observations
-        if o.key in own
-        or restrict_samples(every, [*setup.observed, o], ways=False).members[0].relation.dimension == held
+        if o.key in own or every.restrict([*setup.observed, o], ways=False).members[0].relation.dimension == held
     )

@@ -11,6 +11,9 @@ Coordinates: the components of m but that which is 1; d, or for planes far away 
 or t_i / w; ψ. Nothing is special where a plane holds a desired line (α_i is free) or where springs do not determine ψ.
 Where a rod is short its equation vanishes by itself: f_i · (u_i* − f_i / t_i) = 0 is required of the force that the
 other two leave, too. Far away the three equations depend on each other: Σ f_i · (R b_i − a_i) = 0 is required as well.
+
+Without springs such a platform is not searched. Of a 6-UPS with legs 1, 3 and 5 observed, 300,000
+boxes decide 99.5 % of the space in 27 s.
 """
 
 from __future__ import annotations
@@ -23,8 +26,8 @@ from typing import Any
 
 import numpy as np
 
-from ...batch.enclosures import BoxFormula
-from ...closed_forms.legs import SlidingRod
+from ...closed_forms.legs import ClosedFormLeg
+from ...equations.box_formula import BoxFormula
 from ...geometry.affine import AffineForms, combine, stack
 from ...geometry.components import (
     Components,
@@ -40,20 +43,14 @@ from ...geometry.components import (
 )
 from ...geometry.so3 import convert_to_quaternions
 from ...geometry.vectors import Array
-from ...tolerances import (
-    AFFINE_ROUNDING,
-    CRITICAL_BOX_HALF_EDGE_MIN,
-    CRITICAL_POINT_DISTANCE_TOL,
-    EXACT_INCIDENCE_TOL,
-    FILE_NUMBER_TOL,
-)
+from ...solving.krawczyk import bound_contraction, bound_image
+from ...tolerances import CRITICAL_POINT_DISTANCE_TOL, EXACT_INCIDENCE_TOL
 from .elimination import Flags, Places, away, entries, inverse
-from .joint_bounds import narrow_joint
-from .joint_error import JointError, of_robot, total
-from .loop_error import LoopSubdivision
+from .joint_error import FILE_NUMBER_TOL, JointError, of_robot, total
+from .loop_error import ForceError, LoopSubdivision
 from .points_in_planes_error import TURNED, PlaneError
 from .pose_error import EnclosureFailure, Number, PoseError
-from .subdivision import CriticalBox, Subdivision, forms_of
+from .subdivision import CRITICAL_BOX_HALF_EDGE_MIN, CriticalBox, Subdivision, forms_of
 
 FAR_PLANE_DISTANCE_MIN = 2.0
 """Distance (characteristic lengths) from which planes count as far away."""
@@ -111,15 +108,13 @@ class Springs:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SpringError(JointError):
+class SpringError(ForceError):
     """The equations in a chart: component ``one`` of m is 1, planes are ``distant`` or not, and the platform's normal
     is ``side`` n."""
 
     one: int = field(default=0, kw_only=True)
     distant: bool = field(default=False, kw_only=True)
     side: float = field(default=1.0, kw_only=True)
-    flat = 1
-    """Number of observed directions at right angles to the desired ones at which equilibria are not searched."""
 
     @classmethod
     def about(cls, error: PoseError) -> SpringError:
@@ -129,7 +124,7 @@ class SpringError(JointError):
             error.size < 6
             or len(error.seen) != 3
             or len(limbs) != 3
-            or not all(isinstance(each, SlidingRod) and each.aside == 0 and each.axis is None for each in limbs)
+            or not all(each.slides and each.can_reverse and each.axis is None for each in limbs)
         ):
             raise EnclosureFailure(
                 "the platform rotates about more than one axis, and the observed legs are not three sliding rods"
@@ -143,13 +138,9 @@ class SpringError(JointError):
         return found
 
     @property
-    def limbs(self) -> list[SlidingRod]:
+    def limbs(self) -> list[ClosedFormLeg]:
         """Observed rods."""
-        return [
-            limb
-            for each in self.error.seen
-            if each.limb is not None and isinstance(limb := self.error.limbs[each.limb], SlidingRod)
-        ]
+        return [self.error.limbs[each.limb] for each in self.error.seen if each.limb is not None]
 
     @cached_property
     def desired(self) -> Array:
@@ -280,7 +271,7 @@ class SpringError(JointError):
         found.append(total(_dot(f, minus(b, a)) for f, b, a in zip(at.forces, at.b, at.a, strict=True)))
         return found
 
-    def told_joints(self, y: Sequence[Any], number: Number) -> list[Any]:
+    def close(self, y: Sequence[Any], number: Number) -> list[Any]:
         """sin α h − cos α m · u*, and the moment of the springs about the platform's place."""
         _, h, along = self.plane(y, number)
         found = [sine(z) * each - cosine(z) * own for z, each, own in zip(y[3:6], h, along, strict=True)]
@@ -302,24 +293,9 @@ class SpringError(JointError):
             level.append(-_dot(side, pull))
         return total(across), total(level)
 
-    @cached_property
-    def closing(self) -> BoxFormula:
-        return of_robot(self.told_joints, 7)
-
-    @cached_property
-    def left(self) -> BoxFormula:
-        """Equations beside these."""
-        return of_robot(self.rest, 7)
-
-    @cached_property
-    def bends(self) -> BoxFormula:
-        """The rates of all equations, one after the other."""
-
-        def formula(y: Sequence[Any], known: Number) -> list[Any]:
-            x, number = self.unknowns(y, range(7)), self.make_constant(known)
-            return [rate for each in (*self.told_joints(x, number), *self.rest(x, number)) for rate in each.rates]
-
-        return of_robot(formula, 7)
+    @property
+    def rotates(self) -> list[bool | None]:
+        return [True] * 4
 
     def in_pose(self, one: int, far: int | None) -> PlaneError:
         """Return the same error over the pose, in the chart of its rotation in which a component of the quaternion is
@@ -357,21 +333,6 @@ class SpringError(JointError):
 
         return of_robot(formula, 7)
 
-    @cached_property
-    def ways(self) -> BoxFormula:
-        """h and m · u* of each rod."""
-
-        def formula(y: Sequence[Any], number: Number) -> list[Any]:
-            _, h, along = self.plane(y, number)
-            return [each for pair in zip(h, along, strict=True) for each in pair]
-
-        return of_robot(formula, 3)
-
-    @cached_property
-    def turns(self) -> BoxFormula:
-        """Equations that determine ψ."""
-        return of_robot(self.turn, 6)
-
 
 PRODUCTS = np.linalg.pinv(np.concatenate([TURNED.reshape(9, 16), np.eye(4).reshape(1, 16)])).reshape(4, 4, 10)
 """Products of two components of a unit quaternion, as forms of R by rows and of 1."""
@@ -393,23 +354,7 @@ class SpringSubdivision(LoopSubdivision):
     error: SpringError  # type: ignore[assignment]
 
     def _narrow(self, middle: Array, half: Array) -> tuple[Array, Array]:
-        low, high = middle - half, middle + half
-        forms = forms_of(middle, half)
-        rod = SlidingRod("", self.error.limbs[0].tip, 1.0, centre=np.zeros(3), axis=np.eye(3)[2])
-        ways = [(each.low, each.high) for each in self.error.ways.at(forms[:3])]
-        for k in range(3):
-            i = 3 + k
-            low[:, i], high[:, i] = narrow_joint(
-                rod, (0 * low[:, 0], 0 * low[:, 0]), ways[2 * k], ways[2 * k + 1], (low[:, i], high[:, i])
-            )
-        good = np.all(low <= high, axis=1)
-        across, level = ((each.low, each.high) for each in self.error.turns.at(forms[:6]))
-        known = good & np.isfinite([*across, *level]).all(axis=0)
-        if known.any():
-            one = (level[0][known], level[1][known])
-            two = (-across[1][known], -across[0][known])
-            zero = 0 * one[0]
-            low[known, 6], high[known, 6] = narrow_joint(rod, (zero, zero), one, two, (low[known, 6], high[known, 6]))
+        low, high = super()._narrow(middle, half)
         low[:, 0] = np.where(self._apart(low, high), np.inf, low[:, 0])
         return low, high
 
@@ -469,8 +414,7 @@ class SpringSubdivision(LoopSubdivision):
             F, K = entries(F, rows), entries(K.transposed(), rows).transposed()
             Y = inverse(K.v[0])
             with np.errstate(all="ignore"):
-                off = ((np.eye(7) - combine(Y, K)).size @ about[..., None])[..., 0]
-                far = np.maximum(reach, (combine(Y, F).size + off) * (1 + AFFINE_ROUNDING))
+                far = np.maximum(reach, bound_image(combine(Y, F).size, bound_contraction(Y, K), about))
             proved |= np.all(far < about, axis=1) & np.all(np.abs(np.cos(x[:, 3:6])) > 2 * radius, axis=1)
         return proved
 
@@ -480,7 +424,7 @@ class SpringSubdivision(LoopSubdivision):
         R = np.reshape([self.error.rotation(list(each), np.asarray) for each in x], (-1, 3, 3))
         near = np.abs(convert_to_quaternions(R)).argmax(axis=1)
         # where not all rods slide, no leg reaches far
-        slide = all(isinstance(each, SlidingRod) for each in self.error.error.limbs)
+        slide = self.error.is_endless
         for one in range(4):
             own = near == one
             shift = np.full((len(x), 3), np.nan)

@@ -12,29 +12,17 @@ of P, so that what an equation leaves open counts once.
 
 from __future__ import annotations
 
-import pickle
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache, partial
-from typing import Any
 
 import numpy as np
 
-from ...budgets import BOX_PARTS, BOXES_A_PART, SERIAL_SUBDIVISION_BOXES_COUNT, SUBDIVISION_BATCH_COUNT
 from ...geometry.affine import AffineForms, combine, make_affine, stack
 from ...geometry.vectors import Array
-from ...processes import run_shared
-from ...progress import report
 from ...results import Value
-from ...tolerances import (
-    AFFINE_ROUNDING,
-    BOX_EDGE_RATIO_MIN,
-    BOX_EDGE_ROUNDING_TOL,
-    CRITICAL_BOX_HALF_EDGE_MIN,
-    POSE_BOX_MIN_FRACTION,
-    SINGULAR_BOX_MIN_FRACTION,
-)
-from .cones import cut
+from ...solving.exhaust import AGAIN, SETTLED, Exhaustion
+from ...solving.krawczyk import bound_contraction, bound_image
+from ...tolerances import AFFINE_ROUNDING, SINGULAR_BOX_MIN_FRACTION
 from .elimination import (
     Flags,
     Places,
@@ -48,17 +36,25 @@ from .elimination import (
     solution,
 )
 from .enclosure import negative
-from .joint_bounds import narrow_joints
+from .joint_bounds import BOX_EDGE_ROUNDING_TOL
 from .joint_error import JointError
 
+CRITICAL_BOX_HALF_EDGE_MIN = 1e-7
+"""Smallest half-edge (characteristic lengths, radians) of a box of one critical point."""
+BOX_EDGE_RATIO_MIN = 1e-3
+"""Smallest ratio of such a box's edges."""
+POSE_BOX_MIN_FRACTION = 1e-8
+"""Fraction of the whole box below which an undecided box remains undecided."""
+SUBDIVISION_BATCH_COUNT = 4096
+"""Boxes processed together."""
 WIDER = (1.25, 4.0)
 """Factors by which boxes are enlarged, one after the other, to prove exactly one zero."""
 ZERO_BOX_INFLATION_FRACTION = 4.0
 """Least size of such boxes over the uncertainty of a zero nearby."""
 AROUND = 16.0 ** np.arange(4, -1, -1)
 """Least sizes of enclosing boxes over the smallest boxes, one after the other."""
-SINGULAR = -2
-"""In the place of an axis: a box is left open, ∇g may lose rank in it."""
+SINGULAR, SMALL = SETTLED - 1, SETTLED - 2
+"""In the place of an axis: a box is left open, as ∇g may lose rank in it, or as it is small."""
 BOX_EDGE_RATIO_MAX = 8.0
 """Ratio of a box's edges, as parts of those of the whole, above which the longest is cut."""
 JOINT_SLOPE_WEIGHT_FRACTION = 2.0
@@ -101,10 +97,9 @@ class Subdivision:
     left: list[tuple[Array, Array]] = field(default_factory=list)
     lost: list[tuple[Array, Array]] = field(default_factory=list)
     """Small boxes in which the equations of the legs may be dependent."""
-    proved: list[tuple[Array, Array]] = field(default_factory=list)
-    """Coordinates and multipliers, and the room about them, in which exactly one zero is proved."""
-    flat: list[tuple[Array, Array, Array]] = field(default_factory=list)
-    """Zeros that are flat, the room in a frame, and this (columns)."""
+    proved: list[tuple[Array, Array, Array | None]] = field(default_factory=list)
+    """Coordinates and multipliers, and the room about them, in which exactly one zero is proved: of one that is flat in
+    a frame (columns)."""
 
     singular: float = SINGULAR_BOX_MIN_FRACTION
     """Part of the whole: boxes with edges below it in which equations may be dependent are not cut further."""
@@ -121,9 +116,7 @@ class Subdivision:
 
     def run(self, budget: int, place: int = 0, places: int = 1, jobs: int = 1) -> None:
         """Cut boxes until all are settled, too small, or ``budget`` boxes were processed. Progress reports have the
-        number of the search (``place`` of ``places``), the settled fraction of space, and the number of waiting boxes:
-        the last per cent of space may need most boxes. ``jobs`` processes share many boxes; no result depends on their
-        number."""
+        number of the search (``place`` of ``places``). ``jobs`` processes share many boxes."""
         which = "" if places == 1 else f" of search {place + 1} of {places}"
         self._run(((self.low + self.high) / 2)[None], self.whole[None], budget, jobs, f"boxes{which}")
 
@@ -133,73 +126,30 @@ class Subdivision:
         self.lost = [each for each, is_own in zip(self.lost, chosen, strict=True) if not is_own]
         self.singular = singular
         middle, half = (np.array([each[k] for each in own]) for k in range(2))
-        self._run(middle, half, self.boxes + budget, jobs, "boxes where legs may lock")
+        self._run(middle, half, budget, jobs, "boxes where legs may lock")
 
     def _run(self, middle: Array, half: Array, budget: int, jobs: int, stage: str) -> None:
-        """Cut boxes (c, n): here as long as they are few, then in parts, those that wait dealt out again and again."""
+        """Cut boxes (c, n)."""
+        search = Exhaustion(self, (middle, half), budget, SUBDIVISION_BATCH_COUNT, stage=stage).run_shared(jobs)
+        for middle, half, reason in search.given_up:
+            for kind, boxes in ((SMALL, self.left), (SINGULAR, self.lost)):
+                boxes += zip(middle[reason == kind], half[reason == kind], strict=True)
+        self.left += zip(*search.waiting, strict=True)
+        self.boxes += search.judged
+        self.spent |= len(search.waiting[0]) > 0
 
-        def say(looked: int, waiting: int, share: float) -> None:
-            report(
-                f"{stage}: {np.floor(100 * (1 - share)):.0f} % of the space settled, {looked:,} processed of at most "
-                f"{budget:,}, {waiting:,} waiting"
-            )
-
-        middle, half = self._cut(middle, half, min(budget, self.boxes + SERIAL_SUBDIVISION_BOXES_COUNT), say)
-        if len(middle) and self.boxes < budget:
-            given = pickle.dumps(replace(self, boxes=0, left=[], lost=[], proved=[], flat=[]))
-            while len(middle) and self.boxes < budget:
-                room, waiting = min(BOXES_A_PART * BOX_PARTS, budget - self.boxes), list[Any]()
-                count, share, parts = len(middle), self.share + self._fill(half), min(BOX_PARTS, len(middle), room)
-                works = [
-                    partial(_cut_part, given, middle[k::parts], half[k::parts], room // parts) for k in range(parts)
-                ]
-                for boxes, found, rest in run_shared(works, min(jobs, BOX_PARTS)):
-                    for own, new in zip(self._lists, found, strict=True):
-                        own += new
-                    self.boxes += boxes
-                    waiting.append(rest)
-                    say(self.boxes, count, share)
-                middle, half = (np.concatenate(each) for each in zip(*waiting, strict=True))
-                # the smallest last again
-                order = np.argsort(-np.prod(half / self.whole, axis=1), kind="stable")
-                middle, half = middle[order], half[order]
-        self.left += list(zip(middle, half, strict=True))
-        self.spent |= len(middle) > 0
+    def fresh(self) -> Subdivision:
+        """Return the same, with nothing done."""
+        return replace(self, boxes=0, left=[], lost=[], proved=[])
 
     @property
-    def _lists(self) -> list[list[Any]]:
-        """Results by kind."""
-        return [self.left, self.lost, self.proved, self.flat]
+    def flat(self) -> list[tuple[Array, Array, Array]]:
+        """Zeros that are flat."""
+        return [(at, room, frame) for at, room, frame in self.proved if frame is not None]
 
-    def _fill(self, half: Array) -> float:
-        """Return the fraction of the whole that boxes of half edges (c, n) fill."""
-        return float(np.prod(half / self.whole, axis=1).sum())
-
-    def _cut(
-        self, middle: Array, half: Array, budget: int, say: Callable[[int, int, float], None]
-    ) -> tuple[Array, Array]:
-        """The boxes of these that wait when so many were looked at."""
-        share = self.share
-        while len(middle) and self.boxes < budget:
-            say(self.boxes, len(middle), share + self._fill(half))
-            # the smallest first: memory stays small
-            first = max(0, len(middle) - min(SUBDIVISION_BATCH_COUNT, budget - self.boxes))
-            part, size, axis = self._open(middle[first:], half[first:])
-            self.boxes += len(middle) - first
-            lost, small = axis == SINGULAR, np.all(size <= POSE_BOX_MIN_FRACTION * self.whole, axis=1)
-            for where, boxes in ((small & ~lost, self.left), (lost, self.lost)):
-                boxes += list(zip(part[where], size[where], strict=True))
-            share += self._fill(size[small & ~lost])
-            small |= lost
-            again, rest = ~small & (axis < 0), ~small & (axis >= 0)
-            below, edges = cut(part[rest], size[rest], axis[rest])
-            middle = np.concatenate([middle[:first], part[again], below])
-            half = np.concatenate([half[:first], size[again], edges])
-        return middle, half
-
-    def _open(self, middle: Array, half: Array) -> tuple[Array, Array, Places]:
-        """Boxes (c, n) that are not settled, narrowed, and the axes (c,) across which they are to be cut, −1 of those
-        that are to be looked at again first."""
+    def __call__(self, middle: Array, half: Array) -> tuple[Array, Array, Places]:
+        """Boxes (c, n) that are not settled, narrowed, and the axes (c,) across which they are to be cut, or what else
+        is to be done with them."""
         low, high = self._narrow(middle, half)
         known = np.all(low <= high, axis=1)
         low, high = low[known], high[known]
@@ -235,7 +185,7 @@ class Subdivision:
             middle + half * (low + high) / 2,
             half * np.maximum((high - low) / 2, 0.0) * (1 + BOX_EDGE_ROUNDING_TOL),
         )
-        axis = np.full(len(middle), -1)
+        axis = np.full(len(middle), AGAIN)
         tiny = np.all(size <= 100 * POSE_BOX_MIN_FRACTION * self.whole, axis=1)
         look = np.flatnonzero(~gone & (tiny | np.all(high - low >= 2 * NARROWED_EDGE_FRACTION, axis=1)))
         if len(look):
@@ -264,11 +214,12 @@ class Subdivision:
             gone[look[settled]] = True
             lost = ~finite & np.all(size[look] <= self.singular * self.whole, axis=1)
             axis[look] = np.where(lost, SINGULAR, self._axes(size[look], N[look], F, loose))
+        axis[(axis != SINGULAR) & np.all(size <= POSE_BOX_MIN_FRACTION * self.whole, axis=1)] = SMALL
         return own[~gone], size[~gone], axis[~gone]
 
     def _narrow(self, middle: Array, half: Array) -> tuple[Array, Array]:
         """Return the corners of boxes (c, n) with the joints narrowed by their closed forms."""
-        return narrow_joints(self.error, forms_of(middle, half), middle - half, middle + half)
+        return self.error.narrow(forms_of(middle, half), middle - half, middle + half)
 
     def _settle(self, tube: list[AffineForms], P: Places, N: Places) -> tuple[Flags, AffineForms]:
         """Return True where a tube holds no solution, and F there."""
@@ -333,7 +284,7 @@ class Subdivision:
             one = known & np.all(reach < about, axis=1)
             none = known & np.any((np.abs(shift) - (reach - np.abs(shift)))[:, :n] > half, axis=1)
         for i in np.flatnonzero(one & ~none):
-            self.proved.append((at[i], about[i]))
+            self.proved.append((at[i], about[i], None))
         return one | none
 
     def _near_zero(self, middle: Array, half: Array, P: Places) -> Flags:
@@ -361,7 +312,7 @@ class Subdivision:
             one &= np.all(_apart(own, x, frame) <= about, axis=1)
             while np.any(new := one & ~found[left]):
                 i = int(new.argmax())
-                self.flat.append((x[i], about[i], frame[i]))
+                self.proved.append((x[i], about[i], frame[i]))
                 found[left] |= self._near(own)
                 found[left[i]] = True
         return found
@@ -380,7 +331,6 @@ class Subdivision:
 
     def _multipliers(self, middle: Array, wide: Array, P: Places) -> tuple[AffineForms, Flags]:
         """Multipliers (c, k) at critical points in boxes, in the symbols of these, and whether they are known."""
-        k = self.error.size[1]
         _, M, slope, _ = self._values(forms_of(middle, 0 * middle))
         back = inverse(columns(M.v[0], P))
         mu = np.nan_to_num(-(np.take_along_axis(slope.v[0], P, 1)[:, None] @ back)[:, 0])
@@ -389,7 +339,7 @@ class Subdivision:
         turned = np.swapaxes(back, 1, 2)
         pull = combine(turned, entries(slope + (M * mu[:, :, None]).sum(-2), P))
         rates = entries(M, P)
-        off = (combine(turned, rates.transposed()) - np.eye(k)).size
+        off = bound_contraction(turned, rates.transposed())
         with np.errstate(all="ignore"):
             most = (pull.size.max(axis=1, initial=0.0) / (1 - off.sum(axis=-1).max(axis=1, initial=0.0)))[:, None]
             found = AffineForms(
@@ -423,8 +373,7 @@ class Subdivision:
         Y = pseudo_inverse(K.v[0])
         with np.errstate(all="ignore"):
             shift = combine(Y, pull)
-            off = ((np.eye(at.shape[1]) - combine(Y, K)).size @ about[..., None])[..., 0]
-            return shift.v[0], (shift.size + off) * (1 + AFFINE_ROUNDING)
+            return shift.v[0], bound_image(shift.size, bound_contraction(Y, K), about)
 
     def _equations(self, at: Array, forms: list[AffineForms]) -> tuple[AffineForms, AffineForms]:
         """(∇E + μ ∇g, g) (c, n + k) at places, and its derivatives over boxes about these."""
@@ -446,7 +395,7 @@ class Subdivision:
 
     def zeros(self) -> list[CriticalBox]:
         """The zeros that were proved, enclosed; those that may be at no finite place are left open."""
-        if not self.proved and not self.flat:
+        if not self.proved:
             return []
         n, far = self.error.size[0], self.error.far
         at, room, frame = self._rooms()
@@ -477,8 +426,8 @@ class Subdivision:
 
     def _rooms(self) -> tuple[Array, Array, Array]:
         """All boxes in which exactly one zero is proved: their middles (c, n + k), the room in frames, and these."""
-        every = [*((at, room, np.eye(len(at))) for at, room in self.proved), *self.flat]
-        at, room, frame = (np.array(each) for each in zip(*every, strict=True))
+        plain = [(at, room, np.eye(len(at))) for at, room, frame in self.proved if frame is None]
+        at, room, frame = (np.array(each) for each in zip(*plain, *self.flat, strict=True))
         return at, room, frame
 
     def _report(self, x: Array, reach: Array, frame: Array) -> list[CriticalBox]:
@@ -507,23 +456,6 @@ class Subdivision:
             )
             for i in range(len(x))
         ]
-
-
-def _cut_part(
-    given: bytes, middle: Array, half: Array, budget: int
-) -> tuple[int, list[list[Any]], tuple[Array, Array]]:
-    """Cut a part of the boxes; return the number of boxes cut, the results by kind, and the boxes that wait when the
-    budget is used up."""
-    part = replace(_read(given), left=[], lost=[], proved=[], flat=[])
-    waiting = part._cut(middle, half, budget, lambda *_: None)
-    return part.boxes, part._lists, waiting
-
-
-@lru_cache(maxsize=2)
-def _read(given: bytes) -> Subdivision:
-    """Boxes whose formulas are traced once in each process."""
-    found: Subdivision = pickle.loads(given)
-    return found
 
 
 def forms_of(middle: Array, half: Array, frame: Array | None = None) -> list[AffineForms]:

@@ -18,16 +18,18 @@ from itertools import combinations, product
 import numpy as np
 
 from ...analysis.observed import ObservedRobot
-from ...closed_forms.legs import SlidingRod
 from ...closed_forms.platform_points import PlatformPoint
 from ...geometry import lines
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism import JointType
 from ...results import Value
-from ...tolerances import EXACT_INCIDENCE_TOL, HIDDEN_ROBOT_RESIDUAL_TOL, SHORT_ROD_BOX_FRACTION, SLIDING_ROD_LENGTH_MIN
+from ...tolerances import EXACT_INCIDENCE_TOL, HIDDEN_ROBOT_RESIDUAL_TOL, SLIDING_ROD_LENGTH_MIN
 from .joint_error import JointError, rodless
 from .pose_error import ObservedDirection, PoseError
+
+SHORT_ROD_BOX_FRACTION = 0.1
+"""Fraction of the least distance of two base points up to which boxes around a short rod extend."""
 
 Line = tuple[Array, Array]
 
@@ -52,7 +54,7 @@ class Struts(Value):
             ends = [each for each in joints if each.type is JointType.UNIVERSAL]
             slides = [each for each in joints if each.type is JointType.PRISMATIC]
             if (len(joints), len(ends), len(slides)) != (3, 2, 1) or not (
-                isinstance(limb, SlidingRod) and limb.axis is None and str(limb.label) == leg.label
+                limb.slides and limb.axis is None and str(limb.label) == leg.label
             ):
                 return None
             ends.sort(key=lambda each: mechanism.base not in each.links)
