@@ -8,23 +8,29 @@ import sys
 import sysconfig
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import ModuleType
 
 import numpy as np
 import pytest
 
+import hrsynth
+from description.foreign.rounded import exported, of_hinges
 from hrsynth.codegen.export import ExportedCode
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.kinematics.tasks import solve
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
+from strategies import random_rotation, transformed
 
+OK, LINE, LIMIT, FAR, FOLD, LOST, SINGULAR, OUTSIDE, UNDECIDED, UNREACHED = range(10)
+"""Statuses of generated C++."""
 BARS = (1.0, 0.5, 1.2, 0.8)
 """A crank that turns all round."""
-MAIN = """
+HEAD = """
 #define EIGEN_RUNTIME_NO_MALLOC
 #include "robot.hpp"
 #include <cstdio>
@@ -39,6 +45,11 @@ template <class M> void print(const M& m) {
   for (int i = 0; i < m.rows(); ++i)
     for (int k = 0; k < m.cols(); ++k) std::printf("%.17g ", m(i, k));
 }
+"""
+"""Allocations are counted, matrices printed; NAME is the code's namespace."""
+MAIN = (
+    HEAD
+    + """
 int main() {
   int n = 0;
   if (std::scanf("%d", &n) != 1) return 2;
@@ -54,7 +65,7 @@ int main() {
     const long before = allocations;
     const Status status = jacobians(q, at, rates);
     Motors back = q * 0.9;
-    const Status led = status == Status::ok ? inverse(at.rotation, at.position, back) : status;
+    const Status led = status <= Status::limit ? inverse(at.rotation, at.position, back) : status;
     made += allocations - before;
     std::printf("%d %d ", int(status), int(led));
     print(at.passive); print(at.position); print(at.rotation); print(rates.platform); print(rates.passive); print(back);
@@ -63,6 +74,7 @@ int main() {
   return made == 0 ? 0 : 4;
 }
 """
+)
 FLAGS = ["-std=c++17", "-O1", "-Wall", "-Wextra", "-Werror", "-fno-exceptions"]
 
 
@@ -97,7 +109,7 @@ def geared_five_bar() -> Mechanism:
     ):
         b.joint(name, "R", near, far, at, axis=(0, 0, 1), motor=name == "motor")
     b.joint("tip", "R", "left", "right", (0.4, 1.3, 0), axis=(0, 0, 1), loop=True)
-    b.coupling("gear", "one", "two", -0.7)
+    b.coupling("gear", "motor", "far", -0.7)
     return b.build(platform="left")
 
 
@@ -111,8 +123,34 @@ def screw_lever() -> Mechanism:
     b.joint("pin", "R", "nut", "rod", (0.3, 0, 0), axis=(0, 0, 1))
     b.joint("pivot", "R", "base", "lever", (1, 0, 0), axis=(0, 0, 1))
     b.joint("end", "R", "rod", "lever", (0.8, 0.7, 0), axis=(0, 0, 1), loop=True)
-    b.coupling("thread", "spindle", "nut", 0.02)
+    b.coupling("thread", "motor", "slide", 0.02)
     return b.build(platform="lever")
+
+
+def made(name: str) -> Mechanism:
+    """A robot; those that are not shipped in a tilted base; ``delta_cad`` with balls of three R and six decimals."""
+    own = {"four_bar": four_bar, "geared": geared_five_bar, "screw": screw_lever, "ankle": partial(ankle, 0)}
+    if name == "delta_cad":
+        with TemporaryDirectory() as folder:
+            hinged = of_hinges(hrsynth.load("delta"), aligned=True)
+            return hrsynth.load(exported(hinged, Path(folder) / "delta.urdf", 6))
+    if name not in own:
+        return hrsynth.load(name)
+    rng = np.random.default_rng(0)
+    return transformed(own[name](), random_rotation(rng), rng.normal(size=3))
+
+
+def start_carried_four_bar(name: str) -> Builder:
+    """A four-bar on a cart with a motor, to which more is added."""
+    b = Builder(name)
+    for link in ("base", "cart", "crank", "coupler", "rocker"):
+        b.link(link)
+    b.joint("rail", "P", "base", "cart", (0, 0, 0), axis=(1, 0, 0), motor=True)
+    b.joint("motor", "R", "cart", "crank", (0, 0, 0), axis=(0, 0, 1), motor=True)
+    b.joint("knee", "R", "crank", "coupler", (0.2, 0.5, 0), axis=(0, 0, 1))
+    b.joint("pivot", "R", "cart", "rocker", (1, 0, 0), axis=(0, 0, 1))
+    b.joint("tip", "R", "coupler", "rocker", (1.2, 0.9, 0), axis=(0, 0, 1), loop=True)
+    return b
 
 
 def box_of(robot: Mechanism, half: float) -> dict[str, tuple[float, float]]:
@@ -201,3 +239,24 @@ def answered(program: Path, rows: Array) -> Array:
     done = subprocess.run([program], input=f"{len(rows)}\n{text}\n", capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, (done.returncode, done.stderr[:2000], sys.platform)
     return np.array([[float(x) for x in line.split()] for line in done.stdout.splitlines()])
+
+
+def ankle(seed: int) -> Mechanism:
+    """A foot on a universal joint, moved by two cranks with rods, of random dimensions."""
+    rng = np.random.default_rng(seed)
+    b = Builder("ankle")
+    for name in ("shank", "cross", "foot"):
+        b.link(name)
+    b.joint("pitch", "R", "shank", "cross", axis=(0, 1, 0))
+    b.joint("roll", "R", "cross", "foot", axis=(1, 0, 0))
+    for side, y, z in (("left", 1.0, 0.26), ("right", -1.0, 0.19)):
+        hip, ball = (
+            np.array(at) * rng.uniform(0.9, 1.1, 3) for at in ((-0.01, 0.045 * y, z), (-0.05, 0.04 * y, -0.01))
+        )
+        end = hip - np.array([0.045 * rng.uniform(0.9, 1.1), 0, 0])
+        b.link(f"{side}_crank")
+        b.link(f"{side}_rod")
+        b.joint(f"{side}_motor", "R", "shank", f"{side}_crank", hip, axis=(0, 1, 0), motor=True)
+        b.joint(f"{side}_top", "U", f"{side}_crank", f"{side}_rod", end, axis=(1, 0, 0), axis2=(0, 1, 0))
+        b.joint(f"{side}_ball", "S", f"{side}_rod", "foot", ball, loop=True)
+    return b.build(platform="foot")

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import hrsynth
-from codegen.robots import MAIN, answered, compiled, module_of
+from codegen.robots import LIMIT, MAIN, OK, SINGULAR, answered, compiled, module_of
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.vectors import Array, build_pose, rotate_about_axis
 
@@ -213,7 +213,7 @@ def test_motors_and_passive_joints_count_from_the_files_zero(name: str, tmp_path
     case = CASES[name]
     robot = hrsynth.load(case.file(tmp_path), platform=case.platform)
     assert any(note.kind == "solved" for note in robot.notes)
-    made = module_of(hrsynth.export(robot, "numpy", box_of(case)).code)
+    made = module_of(hrsynth.export(robot, "python", box_of(case)).code)
     q = asked(made.LOWER, made.UPPER)
     status, x, R, p = made.forward(q)
     # a flat zero may be outside of what is proved
@@ -230,12 +230,16 @@ def test_motors_and_passive_joints_count_from_the_files_zero(name: str, tmp_path
 def test_the_cpp_of_it_answers_the_same(name: str, tmp_path: Path):
     case = CASES[name]
     robot = hrsynth.load(case.file(tmp_path), platform=case.platform)
-    made = module_of(hrsynth.export(robot, "numpy", box_of(case)).code)
+    made = module_of(hrsynth.export(robot, "python", box_of(case)).code)
     q = asked(made.LOWER, made.UPPER)
     status, x, R, p = made.forward(q)
-    rows = answered(compiled(tmp_path, hrsynth.export(robot, "c++", box_of(case)).code, MAIN, "-DNAME=moved"), q)
+    rows = answered(
+        compiled(tmp_path, hrsynth.export(robot, "c++", box_of(case), jumps=True).code, MAIN, "-DNAME=moved"), q
+    )
     good, own = status == made.OK, len(made.PASSIVE_NAMES)
-    assert np.array_equal(np.isin(rows[:, 0], (0, 3)), good)  # the hand may be singular, its pose is right
+    assert np.array_equal(
+        np.isin(rows[:, 0], (OK, LIMIT, SINGULAR)), good
+    )  # the hand may be singular, its pose is right
     for column, expected in ((2, x), (2 + own, p), (5 + own, R.reshape(-1, 9))):
         np.testing.assert_allclose(rows[good, column : column + expected.shape[1]], expected[good], atol=1e-11)
 
@@ -257,15 +261,15 @@ def test_a_box_without_the_zero_configuration_names_it(tmp_path: Path):
     case = CASES["limited knee"]
     robot = hrsynth.load(case.file(tmp_path), platform=case.platform)
     with pytest.raises(BadRequest, match=r"with 1\.\d+ \(zero configuration\) in it"):
-        hrsynth.export(robot, "numpy", {"drive": (-0.1, 0.1)})
+        hrsynth.export(robot, "python", {"drive": (-0.1, 0.1)})
 
 
 def test_the_head_states_the_command_and_the_file(tmp_path: Path):
     path = CASES["follower"].file(tmp_path)
     robot = hrsynth.load(path, platform="hand", motors="j1,j3", keyframe="zero")
-    head = hrsynth.export(robot, "numpy", {"j1": (-0.1, 0.1), "j3": (-0.1, 0.1)}).code.splitlines()[:4]
+    head = hrsynth.export(robot, "python", {"j1": (-0.1, 0.1), "j3": (-0.1, 0.1)}).code.splitlines()[:4]
     assert head[1].endswith(
-        "hrsynth export robot.urdf --platform hand --motors j1,j3 --keyframe zero --lang numpy "
+        "hrsynth export robot.urdf --platform hand --motors j1,j3 --keyframe zero --lang python "
         "--observe 1 --box j1=-0.1:0.1,j3=-0.1:0.1"
     )
     assert head[2] == f"# SHA-256 of robot.urdf: {hashlib.sha256(path.read_bytes()).hexdigest()}"

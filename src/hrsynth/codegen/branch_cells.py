@@ -10,13 +10,16 @@ from types import MappingProxyType
 import numpy as np
 
 from ..analysis.branch.answer import BranchPart, BranchProof
-from ..analysis.branch.loop_parts import DISTANCE, LoopPart, evaluate_all_equations, split_loop_system
-from ..analysis.branch.loops import LoopSystem
-from ..budgets import FREE_MOTOR_VALUE_MAX
+from ..equations.joint_equations import LoopSystem
+from ..equations.loop_parts import DISTANCE, LoopPart, evaluate_all_equations, split_loop_system
 from ..errors import NoProvedCell
 from ..geometry.vectors import Array
 from ..results import Value
-from ..tolerances import GENERATED_CLOSURE_TOL
+
+GENERATED_CLOSURE_TOL = 1e-11
+"""Largest closure residual of generated code (cosines; metres, or characteristic lengths above one metre)."""
+FREE_MOTOR_VALUE_MAX = 1e6
+"""Largest coordinate (m, rad) of a motor outside of all loops without limits."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

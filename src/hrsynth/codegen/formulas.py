@@ -1,4 +1,4 @@
-"""The formulas of :mod:`..analysis.branch.loops` on symbols of a tape: equations, poses, and the coordinates of the
+"""The formulas of :mod:`..equations.joint_equations` on symbols of a tape: equations, poses, and the coordinates of the
 joints at which loops are cut. Metres, radians, base axes.
 """
 
@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.branch.loops import JointLoop, LoopSystem, Swept, evaluate_residuals, rotate
+from ..equations.joint_equations import JointLoop, LoopSystem, Swept, evaluate_residuals, rotate
 from ..geometry.affine import compute_dot_forms
 from ..geometry.components import arctan2
 from ..geometry.vectors import build_plane_axes
@@ -25,7 +25,7 @@ def list_equation_rows(system: LoopSystem, values: Sequence[Any]) -> list[Row]:
         row for loop in system.loops for row in zip(*evaluate_residuals(system, loop, values, loop.rows), strict=True)
     ]
     for gear in system.gears:
-        pair = [(i, rate) for i, rate in ((gear.second, 1.0), (gear.first, -gear.ratio)) if values[i] is not None]
+        pair = [(i, rate) for i, rate in gear.slope.items() if values[i] is not None]
         terms = (system.coordinates[i].from_zero(values[i]) * rate for i, rate in pair)
         found.append((sum(terms, np.zeros(1)), dict(pair)))
     return found
@@ -53,7 +53,7 @@ def _turn(swept: Swept, place: int) -> Any:
 def cut(system: LoopSystem) -> list[tuple[str, JointLoop, int]]:
     """The coordinates of the cut joints that one or two axes give: name, loop, which."""
     found = []
-    for loop in system.loops:
+    for loop in {loop.name: loop for loop in system.loops}.values():
         joint = system.mechanism.joints[loop.name]
         count = 0 if joint.type in (JointType.SPHERICAL, JointType.PLANAR) else joint.type.freedoms
         found += [(joint.name if count == 1 else f"{joint.name}.{k + 1}", loop, k) for k in range(count)]

@@ -2,32 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..analysis.branch.answer import BranchProof
-from ..analysis.branch.loop_parts import split_loop_system
-from ..analysis.branch.loops import TreeCoordinate
 from ..analysis.observed import ObservedRobot, RobotLike
 from ..batch.engine import Batch
-from ..batch.tape import Tape
-from ..closed_forms.legs import ClosedFormLeg, OnCrank, OnRod, PinnedRod, PlatformDirection, RailAndLine, SlidingRod
+from ..closed_forms.leg_reading import list_motor_forms
+from ..closed_forms.legs import ClosedFormLeg
 from ..closed_forms.platform_points import PlatformPoint
+from ..equations.joint_equations import TreeCoordinate
+from ..equations.loop_parts import split_loop_system
+from ..equations.tape import Tape
 from ..errors import HrsynthError
 from ..geometry.components import Components, arctan2, dot, minus, plus, scale, transform_vector
 from ..geometry.components import cross as cross_
 from ..geometry.vectors import Array, cross, find_perpendicular
 from ..geometry.vectors import invert_pose as inverted
-from ..mechanism import JointType, Mechanism
-from ..mechanism.legs import Leg
+from ..mechanism import Mechanism
 from ..results import Value
 from ..tolerances import GEOMETRY_DIFFERENCE_TOL
 from .branch_cells import TubedBranch
 from .trace import TracedFunction
 
+READS = ("end", "bend", "direction", "length")
+"""Parts of a leg that may determine a coordinate."""
 INVERSE_CHECK_SAMPLES_COUNT = 64
 """Motors that closed forms must give back."""
 
@@ -51,24 +54,12 @@ class LegMotor(Value):
         frame."""
         form, p = self.form, plus(position, transform_vector(R, self.point))
         tip = plus(plus(p if form.tip.follows else [0.0] * 3, transform_vector(R, form.tip.turned)), form.tip.constant)
-        margin: Any = 1.0
-        if isinstance(form, PlatformDirection):
-            found = transform_vector(R, form.axis)
-            if self.reads == "end":
-                margin, found = form.at(tip, _return_value, form.mode, *found)
-        elif isinstance(form, RailAndLine):
-            margin, found = form.at(
-                tip, _return_value, form.mode, *(transform_vector(R, form.normal) if form.turns else form.normal)
-            )
-        else:
-            margin, found = form.at(tip, _return_value, form.mode)
-        if self.reads == "length":
-            return margin, dot(found, minus(tip, form.centre))
+        margin, found = form.at(tip, lambda value: value, form.mode, R)
         if self.reads == "end":
             return margin, minus(found, self.coordinate.point)
-        if not isinstance(form, OnRod | PinnedRod):
-            return margin, found
-        rod = transform_vector(R, form.axis) if isinstance(form, PinnedRod) else minus(tip, found)
+        rod = form.along(tip, found, R)
+        if self.reads == "length":
+            return margin, dot(rod, minus(tip, form.centre))
         if self.reads == "direction":
             return margin, rod
         axis, spoke = self.coordinate.axis, minus(found, form.centre)
@@ -103,10 +94,6 @@ def trace_inverse(rules: Sequence[LegMotor]) -> TracedFunction:
     return TracedFunction.of(tape, [*(f"r[{k}]" for k in range(9)), *(f"p[{k}]" for k in range(3))], stores)
 
 
-def _return_value(value: Any) -> Any:
-    return value
-
-
 def find_closed_inverse(robot: RobotLike, proof: BranchProof, branch: TubedBranch) -> tuple[LegMotor, ...]:
     """A closed form for each motor, in the working mode of the zero configuration; none where a leg has none, or where
     the working mode is not proved to be the same in all cells (no Type 1 singularity in the box that they fill)."""
@@ -121,10 +108,14 @@ def find_closed_inverse(robot: RobotLike, proof: BranchProof, branch: TubedBranc
         return ()
     q, X = _sample_motors(proof, branch)
     found = []
+    mechanism = branch.system.mechanism
+    legs = {leg: batch.legs[leg.label] for leg in observed.decomposition.legs}
     for k, i in enumerate(branch.motors):
         coordinate = branch.system.coordinates[i]
-        forms = _list_forms(observed, batch, branch.system.mechanism, coordinate)
-        rules = (_find_rule(coordinate, form, reads, batch, X, q[:, k]) for form, reads in forms)
+        forms = list_motor_forms(
+            mechanism, legs, mechanism.joints[coordinate.joint], partial(_locate_on_platform, batch, mechanism)
+        )
+        rules = (_find_rule(coordinate, form, reads, batch, X, q[:, k]) for form in forms for reads in READS)
         rule = next((each for each in rules if each is not None), None)
         if rule is None:
             return ()
@@ -151,68 +142,10 @@ def _sample_motors(proof: BranchProof, branch: TubedBranch) -> tuple[Array, Arra
     return q, np.array([system.pose(system.mechanism.platform, row.tolist()) for row in values])
 
 
-def _list_forms(
-    observed: ObservedRobot, batch: Batch, mechanism: Mechanism, coordinate: TreeCoordinate
-) -> Iterator[tuple[ClosedFormLeg, str]]:
-    """Yield forms that may determine a coordinate, and the part of them that is read."""
-    motor = coordinate.joint
-    joint = mechanism.joints[motor]
-    if mechanism.base in joint.links:
-        crank = joint.other(mechanism.base)
-        for each in mechanism.joints_of(crank):
-            if mechanism.platform in each.links:
-                yield PinnedRod(motor, _locate_on_platform(batch, mechanism, each.point), axis=coordinate.axis), "end"
-    for leg in observed.decomposition.legs:
-        form = batch.legs[leg.label]
-        if motor not in leg.joints or not isinstance(form, ClosedFormLeg):
-            continue
-        if form.crank and not coordinate.parent >= 0:
-            yield form, "end"
-        if isinstance(form, OnRod):
-            yield form, "bend" if isinstance(form, OnCrank) else "direction"
-        if isinstance(form, PlatformDirection):
-            if mechanism.platform in joint.links:
-                for name in leg.joints:
-                    yield (
-                        PinnedRod(
-                            motor,
-                            _locate_on_platform(batch, mechanism, joint.point),
-                            axis=form.axis,
-                            centre=mechanism.joints[name].point,
-                        ),
-                        "bend",
-                    )
-            for name in leg.joints:
-                yield replace(form, centre=mechanism.joints[name].point, radius=0.0), "length"
-        if isinstance(form, SlidingRod | PlatformDirection):
-            yield form, "length" if coordinate.slides else "direction"
-        yield from ((each, "end") for each in _list_rail_forms(batch, mechanism, leg, coordinate))
-
-
 def _locate_on_platform(batch: Batch, mechanism: Mechanism, place: Array) -> PlatformPoint:
     """A point that is fixed in the platform's link, by its place at zero."""
     X = mechanism.links[mechanism.platform].pose
     return PlatformPoint(True, (inverted(X) @ np.append(place, 1.0))[:3] - batch.coordinates.point, np.zeros(3))
-
-
-def _list_rail_forms(batch: Batch, mechanism: Mechanism, leg: Leg, coordinate: TreeCoordinate) -> Iterator[RailAndLine]:
-    """A slider of the base, an R and a P to the platform, in any order: the line along the P goes with the platform, or
-    with the slider."""
-    joints = [mechanism.joints[name] for name in leg.joints if name != coordinate.joint]
-    if not coordinate.slides or sorted(each.type.value for each in joints) != ["P", "R"]:
-        return
-    slide, turn = sorted(joints, key=lambda each: each.type is JointType.REVOLUTE)
-    R, normal = mechanism.links[mechanism.platform].pose[:3, :3], cross(slide.axis, turn.axis)
-    tip = _locate_on_platform(batch, mechanism, turn.point)
-    for turns in (False, True):
-        yield RailAndLine(
-            leg.label,
-            tip,
-            centre=turn.point,
-            axis=coordinate.axis,
-            normal=R.T @ normal if turns else normal,
-            turns=turns,
-        )
 
 
 def _find_rule(

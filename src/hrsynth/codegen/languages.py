@@ -11,22 +11,38 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..budgets import GENERATED_INVERSE_STEPS_MAX, GENERATED_NEWTON_STEPS_MAX
 from ..characters import name_steering
-from ..tolerances import (
-    GENERATED_LAST_STEP_MAX,
-    GENERATED_NEWTON_STEP_TOL,
-    GENERATED_PIVOT_MIN_FRACTION,
-    GENERATED_POSE_TOL,
-)
+from ..tolerances import GENERATED_LAST_STEP_MAX
+from .branch_cells import GENERATED_CLOSURE_TOL
 from .inverse import trace_inverse
 from .source import Source
 from .trace import TracedFunction
+from .tracker import Tracker
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-TEMPLATES = {"c++": "header.hpp.j2", "numpy": "module.py.j2"}
+GENERATED_NEWTON_STEP_TOL = 1e-7
+"""Newton step (characteristic lengths, radians) after which generated code makes its last one."""
+GENERATED_NEWTON_STEPS_MAX = 8
+"""Largest number of Newton steps of generated code per part of the loops."""
+GENERATED_POSE_TOL = 1e-12
+"""Difference from a pose at which generated code has reached it (rad; lengths as above)."""
+GENERATED_PIVOT_MIN_FRACTION = 1e-14
+"""Relative pivot of the normal equations below which generated code reports singular rates."""
+GENERATED_INVERSE_STEPS_MAX = 20
+"""Largest number of steps of generated code from motors to motors toward a pose."""
+GENERATED_ROUNDING_UNITS_COUNT = 64
+"""Least tolerance of generated Python code, in rounding units of its arrays; it counts in single precision."""
+
+GENERATED_BATCH_STEPS_COUNT = 5
+"""Steps of Newton's method of generated Python code from the middle of a tube, tested at its corners."""
+GENERATED_TUBE_RADIUS_MIN = 1e-12
+"""Smallest radius of a tube that a tracker proves (characteristic lengths, radians)."""
+GENERATED_ERROR_MAX = 1e-9
+"""Largest error of an answer that a tracker continues (characteristic lengths, radians)."""
+
+TEMPLATES = {"c++": "header.hpp.j2", "python": "module.py.j2"}
 """The languages."""
 TAKEN = frozenset(
     re.findall(
@@ -39,7 +55,8 @@ TAKEN = frozenset(
     template this thread_local throw true try typedef typeid typename union unsigned using virtual void volatile wchar_t
     while xor xor_eq Eigen detail main std
     BUFSIZ EDOM EOF FILE ERANGE HUGE_VAL INFINITY M_E M_PI NAN NDEBUG NULL RAND_MAX errno linux stderr stdin stdout unix
-    DIRECTIONS DIRECTION_NAMES Jacobians LOWER MOTORS MOTOR_NAMES Motors PASSIVE PASSIVE_NAMES Passive STEPS Solution
+    Branch DIRECTIONS DIRECTION_NAMES
+    Jacobians LOWER MOTORS MOTOR_NAMES Motors PASSIVE PASSIVE_NAMES Passive Solution
     Status UPPER forward inverse jacobians unique""",
     )
 )
@@ -105,7 +122,6 @@ def render_program(source: Source, language: str, told: Sequence[str]) -> str:
         "p": len(branch.passive),
         "c": len(source.cut),
         "d": d,
-        "steps": source.bounds.steps if source.bounds else GENERATED_NEWTON_STEPS_MAX,
         "inverse": GENERATED_INVERSE_STEPS_MAX,
         "parts": source.parts,
         "functions": functions,
@@ -118,14 +134,36 @@ def render_program(source: Source, language: str, told: Sequence[str]) -> str:
         "turning": [int(not branch.system.coordinates[i].slides) for i in branch.motors],
         "length": repr(float(mechanism.length)),
         "near": GENERATED_NEWTON_STEP_TOL,
+        "newton": GENERATED_NEWTON_STEPS_MAX,
+        "steps": GENERATED_BATCH_STEPS_COUNT,
+        "closing": GENERATED_CLOSURE_TOL,
+        "single": GENERATED_ROUNDING_UNITS_COUNT,
         "last_step": GENERATED_LAST_STEP_MAX,
         "legs": source.legs and trace_inverse(source.legs),
         "far": repr(branch.far),
         "reached": GENERATED_POSE_TOL,
         "turn": repr(2 * math.pi),
         "singular": GENERATED_PIVOT_MIN_FRACTION,
+        **(_describe_tracker(source, source.tracker) if source.tracker else {}),
     }
     return name_steering(_load_templates().get_template(TEMPLATES[language]).render(**values))
+
+
+def _describe_tracker(source: Source, tracker: Tracker) -> dict[str, Any]:
+    """Return the values of a tracker's template."""
+    zero, units = tracker.system.zero, tracker.system.units
+    variables = {"q": list(source.branch.motors), "x": list(source.branch.passive)}
+    return {
+        "tracked": tracker.parts,
+        "checked": tracker.checked,
+        "checked_count": tracker.checked_count,
+        "closed": GENERATED_CLOSURE_TOL,
+        "limits": tracker.limits(source.branch, source.cut),
+        "thinnest": GENERATED_TUBE_RADIUS_MIN,
+        "error": GENERATED_ERROR_MAX,
+        **{f"zero_{name}": zero[places].tolist() for name, places in variables.items()},
+        **{f"unit_{name}": units[places].tolist() for name, places in variables.items()},
+    }
 
 
 @cache

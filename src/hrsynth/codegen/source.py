@@ -12,9 +12,9 @@ from ..mechanism.observations.direction import Direction
 from ..results import Value
 from .branch_cells import TubedBranch, TubePart
 from .cell_tree import Node, build_cell_tree, compute_tree_depth
-from .convergence import BoundedCell, bound_cells, bound_platform_error
 from .inverse import LegMotor
 from .trace import FormulaTracer, TracedFunction
+from .tracker import Tracker
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -29,8 +29,6 @@ class SourcePart(Value):
     closure: TracedFunction
     rows: tuple[int, ...]
     """The places of G among E."""
-    count: int
-    """Number of equations in all."""
     closed: tuple[float, ...]
     """Tolerance of each of them in a result."""
     root: int
@@ -42,34 +40,6 @@ class SourcePart(Value):
     units: tuple[float, ...]
     lower: tuple[float, ...]
     upper: tuple[float, ...]
-    bounded: tuple[BoundedCell, ...]
-
-
-@dataclass(frozen=True)
-class ProvedBounds:
-    """Steps of Newton's method that are enough in each part, and how far an answer is from the closure at most, with
-    rounding: ``joints`` (radians, characteristic lengths), the entries of the platform's ``rotation``, its ``position``
-    (characteristic lengths); ``others``: equations of the loops that are not solved, which the program tests."""
-
-    steps: int
-    joints: float
-    rotation: float
-    position: float
-    others: int
-
-    @property
-    def error(self) -> float:
-        """Largest of the three."""
-        return max(self.joints, self.rotation, self.position)
-
-    @property
-    def more(self) -> str:
-        """Further tests, in words."""
-        return (
-            "one more equation of the loops holds"
-            if self.others == 1
-            else (f"each of {self.others} more equations of the loops holds")
-        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -87,27 +57,32 @@ class Source(Value):
     observed: tuple[Direction, ...]
     legs: tuple[LegMotor, ...]
     """Closed forms of the motors of a pose; none where Newton's method finds them."""
-    bounds: ProvedBounds | None
-    """Proved bounds of its steps and results; None if some cell has no bound."""
+    tracker: Tracker | None = None
+    """Formulas that are proved at run time."""
 
     @classmethod
-    def of(cls, branch: TubedBranch, observed: Sequence[Direction], legs: Sequence[LegMotor] = ()) -> Source:
+    def of(
+        cls,
+        branch: TubedBranch,
+        observed: Sequence[Direction],
+        legs: Sequence[LegMotor] = (),
+        tracker: Tracker | None = None,
+    ) -> Source:
         """The formulas of a branch, those of observed directions and of the motors of a pose."""
         tracer = FormulaTracer(branch.system, branch.motors, branch.passive)
-        parts = tuple(_build_part(branch, tracer, part) for part in branch.parts)
+        parts = tuple(_build_part(branch, tracer, part) for part in branch.parts if part.cells)
         names, values, slopes = tracer.cut()
-        platform = tracer.platform()
         return cls(
             branch,
             parts,
-            platform,
+            tracer.platform(),
             tuple(names),
             values,
             slopes,
             tracer.rates(observed),
             tuple(observed),
             tuple(legs),
-            _combine_bounds(branch, parts, platform),
+            tracker,
         )
 
     def names(self, places: Sequence[int]) -> list[str]:
@@ -122,60 +97,25 @@ def _build_part(branch: TubedBranch, tracer: FormulaTracer, part: TubePart) -> S
     unknowns = [branch.passive.index(i) for i in part.unknowns]
     equations, slopes = tracer.loops(rows, part.unknowns, part.driven)
     lower, upper = branch.lower[driven], branch.upper[driven]
-    closure, own = tracer.closure(every), [every.index(i) for i in rows]
-    bounded = bound_cells(branch, part, rows, own, equations, closure)
-    units = np.array([branch.unit(i) for i in part.unknowns])
-    tried = [each.trial_cell(units) for each in bounded]
-    root, nodes = build_cell_tree(lower, upper, [(cell.lower, cell.upper) for cell in tried])
+    root, nodes = build_cell_tree(lower, upper, [(cell.lower, cell.upper) for cell in part.cells])
     cells = tuple(
-        (tuple(cell.centre), tuple(cell.middle), tuple(cell.slopes.ravel()), tuple(cell.radius)) for cell in tried
+        (tuple(cell.centre), tuple(cell.middle), tuple(cell.slopes.ravel()), tuple(cell.radius)) for cell in part.cells
     )
     return SourcePart(
         tuple(driven),
         tuple(unknowns),
         equations,
         slopes,
-        closure,
-        tuple(own),
-        len(every),
+        tracer.closure(every),
+        tuple(every.index(i) for i in rows),
         _convert_to_floats(tuple(branch.closing_tolerance(every))),
         root,
         tuple(nodes),
         compute_tree_depth(root, nodes),
         _convert_to_floats(cells),
-        _convert_to_floats(tuple(units)),
+        tuple(float(branch.unit(i)) for i in part.unknowns),
         tuple(map(float, lower)),
         tuple(map(float, upper)),
-        tuple(bounded),
-    )
-
-
-def _combine_bounds(branch: TubedBranch, parts: Sequence[SourcePart], platform: TracedFunction) -> ProvedBounds | None:
-    """The bounds of all parts together."""
-    every = [each for part in parts for each in part.bounded]
-    if not all(each.steps and np.all(np.isfinite(each.error)) for each in every):
-        return None
-    count = len(branch.passive)
-    ranges, errors, units = np.zeros((2, count)), np.zeros(count), np.ones(count)
-    for part in parts:
-        places = list(part.unknowns)
-        reach = [
-            np.abs(each.cell.slopes) @ (each.cell.upper - each.cell.centre)
-            + 2 * np.maximum(each.cell.radius, each.inner)
-            for each in part.bounded
-        ]
-        middles = [each.cell.middle for each in part.bounded]
-        ranges[0, places] = np.min(np.subtract(middles, reach), axis=0)
-        ranges[1, places] = np.max(np.add(middles, reach), axis=0)
-        errors[places] = np.max([each.error for each in part.bounded], axis=0)
-        units[places] = part.units
-    rotation, position = bound_platform_error(branch, ranges, errors, platform)
-    return ProvedBounds(
-        max(each.steps for each in every),
-        float((errors / units).max()),
-        rotation,
-        position / branch.system.mechanism.length,
-        sum(part.count - len(part.rows) for part in parts),
     )
 
 

@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.branch.loops import LoopSystem, rotate
-from ..batch.tape import Symbol, Tape
+from ..equations.joint_equations import LoopSystem, rotate
+from ..equations.loop_parts import LoopEquation, LoopPart, evaluate_equations
+from ..equations.tape import Symbol, Tape
 from ..geometry.affine import compute_cross_forms
 from ..mechanism.observations.direction import Direction
 from ..results import Value
 from .formulas import cut, cut_coordinate, list_equation_rows, place_frame
+from .sums import gather_sums
 
 Place = tuple[int, ...]
 VALUES = ("R", "p", "u", "O")
@@ -28,12 +30,18 @@ class TracedFunction(Value):
     stores: tuple[tuple[str, Place, str], ...]
 
     @classmethod
-    def of(cls, tape: Tape, names: Sequence[str], stores: Iterable[tuple[str, Place, Any]]) -> TracedFunction:
-        """Keep the operations that some symbols of a tape need; derivatives that are constantly zero are not stored."""
+    def of(
+        cls, tape: Tape, names: Sequence[str], stores: Iterable[tuple[str, Place, Any]], gathered: bool = False
+    ) -> TracedFunction:
+        """Keep the operations that some symbols of a tape need; derivatives that are constantly zero are not stored.
+        With sums ``gathered`` or not."""
         single = [
             (array, place, np.ravel(value)[0] if isinstance(value, np.ndarray) else value)
             for array, place, value in stores
         ]
+        if gathered:
+            tape, values = gather_sums(tape, [value for _, _, value in single])
+            single = [(array, place, value) for (array, place, _), value in zip(single, values, strict=True)]
         kept = [
             (array, place, value)
             for array, place, value in single
@@ -67,7 +75,8 @@ class FormulaTracer(Value):
         """Names of the coordinates in the code."""
         return [f"q[{k}]" for k in range(len(self.motors))] + [f"x[{k}]" for k in range(len(self.passive))]
 
-    def _values(self, tape: Tape) -> list[Any]:
+    def values(self, tape: Tape) -> list[Any]:
+        """All coordinates as symbols, None for those held."""
         places = self.places
         return [
             np.array([tape.load(places[i])], dtype=object) if i in places else None
@@ -79,7 +88,7 @@ class FormulaTracer(Value):
     ) -> tuple[TracedFunction, TracedFunction]:
         """G with J, its derivatives by ``unknowns``; K, those by ``driven`` coordinates; of some equations."""
         tape = Tape([])
-        found = list_equation_rows(self.system, self._values(tape))
+        found = list_equation_rows(self.system, self.values(tape))
         stores: list[tuple[str, Place, Any]] = [("G", (i,), found[row][0]) for i, row in enumerate(which)]
         slopes: list[list[tuple[str, Place, Any]]] = []
         for array, columns in (("J", unknowns), ("K", driven)):
@@ -94,16 +103,29 @@ class FormulaTracer(Value):
             )
         return (TracedFunction.of(tape, self.names, stores + slopes[0]), TracedFunction.of(tape, self.names, slopes[1]))
 
+    def equations(
+        self, part: LoopPart, which: Sequence[LoopEquation], unknowns: Sequence[int]
+    ) -> tuple[TracedFunction, TracedFunction]:
+        """G, some equations of a part, and J, their derivatives by ``unknowns``."""
+        tape = Tape([])
+        values, slopes = evaluate_equations(part.system, which, self.values(tape))
+        where = {i: k for k, i in enumerate(unknowns)}
+        rates = [
+            ("J", (row, where[i]), rate) for row, slope in enumerate(slopes) for i, rate in slope.items() if i in where
+        ]
+        stores = [("G", (row,), value) for row, value in enumerate(values)]
+        return (TracedFunction.of(tape, self.names, stores, True), TracedFunction.of(tape, self.names, rates, True))
+
     def closure(self, which: Sequence[int]) -> TracedFunction:
         """E, what is left of some equations."""
         tape = Tape([])
-        found = list_equation_rows(self.system, self._values(tape))
+        found = list_equation_rows(self.system, self.values(tape))
         return TracedFunction.of(tape, self.names, [("E", (i,), found[row][0]) for i, row in enumerate(which)])
 
     def platform(self) -> TracedFunction:
         """Rotation R (3, 3) and position p (3,) of the platform's frame."""
         tape = Tape([])
-        R, p, _ = place_frame(self.system, self._values(tape), self.system.mechanism.platform)
+        R, p, _ = place_frame(self.system, self.values(tape), self.system.mechanism.platform)
         return TracedFunction.of(
             tape,
             self.names,
@@ -114,7 +136,7 @@ class FormulaTracer(Value):
         """The names of the cut joints' coordinates; O, their values; C, their derivatives by the coordinates of q, then
         x."""
         tape, places, names = Tape([]), self.places, cut(self.system)
-        values = self._values(tape)
+        values = self.values(tape)
         found = [cut_coordinate(self.system, values, loop, which) for _, loop, which in names]
         return (
             [name for name, _, _ in names],
@@ -130,7 +152,7 @@ class FormulaTracer(Value):
         """V (6, n), the velocity of the platform's frame, and W (3 k, n), those of the observed directions u (3 k,), by
         the coordinates of q, then x."""
         tape, places, mechanism = Tape([]), self.places, self.system.mechanism
-        values = self._values(tape)
+        values = self.values(tape)
         twists = place_frame(self.system, values, mechanism.platform)[2]
         stores = [
             store
