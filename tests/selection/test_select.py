@@ -28,7 +28,7 @@ from hrsynth.selection.loop_ends import LoopEnds, explain_smaller_set
 from hrsynth.selection.select import Candidate, Criteria, Selection, _Work, select
 from hrsynth.selection.sight import CameraView, find_hidden_points, parse_camera_pose
 from hrsynth.simulation.camera import Camera, cylinders
-from hrsynth.simulation.equilibria.attraction_radius import CertifiedRadius, certified_radius
+from hrsynth.simulation.equilibria.attraction_radius import AttractionRadius, prove_attraction_radius
 from hrsynth.simulation.equilibria.basins import basins
 from hrsynth.simulation.equilibria.equilibria import EquilibriumSearch
 from hrsynth.tolerances import RELATION_ANGLE_TOL
@@ -170,7 +170,7 @@ def test_what_is_not_examined_is_neither_kept_nor_discarded(examine: int) -> Non
 
 def ends(others: tuple[str, ...] | None, length: float) -> LoopEnds:
     at = work().goal
-    radius = CertifiedRadius(at, work().setup.motion, length, None, 0.0, 0.0, 1, "not proved")
+    radius = AttractionRadius(at, work().setup.motion, length, None, 0.0, 0.0, "not proved")
     return LoopEnds(others, None if others is None else radius)
 
 
@@ -230,12 +230,12 @@ def test_endings_are_those_of_the_single_questions() -> None:
         setup.all_samples.start, setup.all_samples.observation_model, Pose.parse("x=-0.01,y=0.03"), setup.motion
     )
     assert best.equilibria is not None
-    assert best.equilibria.length == pytest.approx(certified_radius(setup, goal).length)
+    assert best.equilibria.length == pytest.approx(prove_attraction_radius(setup, goal).length)
     found = EquilibriumSearch.of(setup, goal).answer(minima=True).stable
     assert best.equilibria.others == tuple(sorted(each.kind for each in found if each.kind != "goal"))
     assert best.equilibria.others
     record = best.to_dict()["equilibria"]
-    assert record["attracting"] == len(record["kinds"]) == len(best.equilibria.others)
+    assert record["stable"] == len(record["kinds"]) == len(best.equilibria.others)
 
 
 def test_a_singular_end_discards() -> None:

@@ -41,10 +41,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
-from ..budgets import ARCHITECTURE_KEY_LEGS_MAX
 from ..errors import BadRequest
 from ..mechanism.observations import list_kinds
 from ..mechanism.observations.encoder import Encoder
+
+ARCHITECTURE_KEY_LEGS_MAX = 12
+"""Largest number of legs of an architecture key."""
 
 ARCHITECTURE_KEY_VERSION = 1
 """Version of the words and of the mechanisms they stand for."""

@@ -10,10 +10,18 @@ from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
-from ..budgets import CATALOG_LINE_CHARACTERS_MAX
 from ..errors import BadRequest
 from .architecture_key import LONGEST_COUNT, MOVED, count_equal, parse_observations
-from .jsonl import FLAGS, LINE_START, REBUILD, Record, is_written, parse_record, read_leading_word
+from .jsonl import (
+    CATALOG_LINE_CHARACTERS_MAX,
+    FLAGS,
+    LINE_START,
+    REBUILD,
+    Record,
+    is_written,
+    parse_record,
+    read_leading_word,
+)
 from .known import find_named_kinds, list_known_names, list_leg_kinds
 
 FIELDS = (

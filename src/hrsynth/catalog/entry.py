@@ -18,7 +18,7 @@ from ..analysis.modes.methods import count_modes as counted_modes
 from ..analysis.modes.methods import expected_modes
 from ..analysis.modes.modes import modes
 from ..analysis.modes.solve import SystemModes
-from ..analysis.observed import ObservedRobot, restrict_samples, select_relation
+from ..analysis.observed import ObservedRobot
 from ..analysis.pose_requests import observe
 from ..analysis.verdict import CONTROLLABLE, Verdict, compute_verdict
 from ..errors import (
@@ -39,10 +39,12 @@ from ..mechanism.model import Mechanism
 from ..mechanism.normal import reduce_to_normal_form
 from ..mechanism.sensors import make_encoders
 from ..rewrite.strategy import Step
-from ..tolerances import PROVED_ENTRY_ERROR_CHANCE_MAX
 from .architecture_key import ArchitectureKey, count_equal, parse
 from .geometry import build_mechanism
 from .groups import group
+
+PROVED_ENTRY_ERROR_CHANCE_MAX = 1e-9
+"""Largest probability of error of a proved catalog entry."""
 
 VERDICT_SAMPLES_COUNT = 10
 """Closed configurations at which an exact verdict is confirmed."""
@@ -103,7 +105,7 @@ class ArchitectureStudy:
 
     def motor_rank(self, names: Sequence[str]) -> int:
         """Return the rank of motors on these joints: the platform dof that they determine."""
-        return select_relation(self.encoders, [i for i, name in enumerate(self.joints) if name in names]).rank
+        return self.encoders.select([i for i, name in enumerate(self.joints) if name in names]).rank
 
     def record(self, drawn: Mechanism, motors: Sequence[str]) -> dict[str, Any]:
         """The fields of a record, of a mechanism with motors on these joints."""
@@ -246,7 +248,7 @@ def _find_smallest_sets(
         found = []
         for places in sets(size):
             seen = [_choose_observations(setup)[i] for i in places]
-            samples = restrict_samples(setup.all_samples, seen, ways=False)
+            samples = setup.all_samples.restrict(seen, ways=False)
             verdict = compute_verdict(setup, [o.leg for o in seen], samples)
             if exact is not None:
                 _require_agreement(exact, samples, verdict)
@@ -291,13 +293,13 @@ def _strip_dimensions(name: str) -> str:
 
 def _describe_singularities(setup: ObservedRobot) -> dict[str, Any]:
     """Return the Type 2 condition in words, None if there is none."""
-    return {"condition": MeasuredRobot.of_directions(setup).condition.words}
+    return {"condition": MeasuredRobot.of(setup).condition.words}
 
 
 def _count_modes(setup: ObservedRobot, fewest: Sequence[Sequence[str]]) -> dict[str, Any]:
     """Complex assembly modes of a smallest set of legs, by what there are no more if not by a resultant, and the most
     real ones of some configurations: of the first set, or else of that of which fewest can be expected."""
-    robots = [MeasuredRobot.of_directions(_observe_legs(setup, legs)) for legs in fewest]
+    robots = [MeasuredRobot.of(_observe_legs(setup, legs)) for legs in fewest]
     at = setup.configurations[0]
 
     def tried() -> Iterator[int]:

@@ -8,10 +8,12 @@ from functools import partial
 from itertools import islice
 from typing import Any
 
-from ..budgets import PARTS_PER_THREAD_COUNT
 from ..errors import BadRequest, MissingExtra, WorkersLost
 from ..processes import run_shared
 from ..version import __version__
+
+PARTS_PER_THREAD_COUNT = 3
+"""Parts of a build waiting for each thread of a cluster."""
 
 Made = list[tuple[str, str]]
 """Words with the lines of their records."""

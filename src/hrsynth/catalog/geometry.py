@@ -25,8 +25,10 @@ from ..mechanism.normal import reduce_to_normal_form
 from ..mechanism.observations import list_kinds
 from ..mechanism.observations.direction import Direction
 from ..mechanism.sensors import choose_default_segment, observe_segment
-from ..tolerances import U_JOINT_COSINE_TOL
 from .architecture_key import COMPOSITE, ArchitectureKey, JointSymbol, LegKey
+
+U_JOINT_COSINE_TOL = 1e-9
+"""Cosine below which the axes of a U in the catalog are perpendicular."""
 
 Z = np.array([0.0, 0.0, 1.0])
 

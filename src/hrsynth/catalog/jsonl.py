@@ -7,9 +7,11 @@ import zlib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from ..budgets import CATALOG_LINE_CHARACTERS_MAX
 from ..errors import BadRequest
 from .architecture_key import ARCHITECTURE_KEY_VERSION
+
+CATALOG_LINE_CHARACTERS_MAX = 100_000
+"""Largest line of the catalog, and text in a SQLite file (characters)."""
 
 Record = Mapping[str, Any]
 """Entry of one architecture; a missing field is unknown or does not apply."""

@@ -11,7 +11,6 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
-from ..budgets import CATALOG_JSON_PARTS_MAX
 from ..errors import BadRequest
 from ..results import Value
 from .architecture_key import SENSORS, parse
@@ -19,6 +18,9 @@ from .conditions import list_matching_lines, require_askable
 from .jsonl import Record, parse_record, read_leading_word
 from .known import find_alias, is_called, order
 from .store import DATABASES, ShippedCatalogs, Store, locate_shipped_folder, store
+
+CATALOG_JSON_PARTS_MAX = 7_000_000
+"""Lists, objects and commas in all entries read, plus three per entry: each takes up to two hundred bytes."""
 
 
 class ReadRecords(Sequence[Record]):

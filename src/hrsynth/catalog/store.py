@@ -14,7 +14,6 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from ..budgets import CATALOG_ENTRIES_MAX, CATALOG_LINE_CHARACTERS_MAX, CATALOG_MAX_BYTES
 from ..description.files import open_regular, open_replacement
 from ..errors import BadRequest, BuildInterruption
 from ..untrusted import unpack_gzip
@@ -22,6 +21,7 @@ from .architecture_key import ARCHITECTURE_KEY_VERSION
 from .conditions import RecordQuestion, fill, list_matching_lines
 from .journal import ENDING, Journal
 from .jsonl import (
+    CATALOG_LINE_CHARACTERS_MAX,
     FLAGS,
     REBUILD,
     decode_lines,
@@ -31,6 +31,11 @@ from .jsonl import (
     read_leading_word,
     require_version,
 )
+
+CATALOG_ENTRIES_MAX = 1_000_000
+"""Largest number of lines of a compressed catalog file."""
+CATALOG_MAX_BYTES = 100_000_000
+"""Largest unpacked size of the lines of a catalog (bytes)."""
 
 DATABASES = (".sqlite", ".sqlite3", ".db")
 """Extensions of a SQLite store."""

@@ -11,7 +11,6 @@ from typing import Any
 from ..analysis.aspects.path import PathAnswer
 from ..analysis.derive import Derivation
 from ..analysis.modes.modes import AssemblyModes
-from ..budgets import VERIFY_TIMEOUT_S
 from ..description import load
 from ..description.files import convert_to_path, open_regular
 from ..errors import BadRequest, InvalidCertificate, NoCertificate, PoseReachFailure
@@ -22,6 +21,9 @@ from . import modes, paths, ranks, verify_certificate, verify_path, verify_ranks
 from .verify_certificate import CertificateRejection, once, rational
 from .verify_path import PathRejection
 from .verify_ranks import RankRejection
+
+VERIFY_TIMEOUT_S = 40
+"""Seconds of one core after which checking a certificate file is given up."""
 
 
 def certificate(found: AssemblyModes | Derivation | PathAnswer) -> dict[str, Any]:

@@ -16,12 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.modes.carrying_leg_modes import enclose_zeros, proposals
+from ..analysis.modes.carrying_leg_modes import enclose_zeros, measure_joint_distances, proposals
 from ..analysis.modes.carrying_leg_system import CarriedCondition, CarriedPlatform, Turn, permanent
 from ..analysis.modes.conditions import AtAngle, OnPlane, OnRevolution
 from ..analysis.modes.quadrics import UNIT
 from ..analysis.modes.single_loop import SingleLoop, dual_product
 from ..geometry.vectors import Array
+from ..solving.newton import SAME_ZERO_DISTANCE_TOL, approach_zeros, collect_zeros
 from .closures import write_numbers
 from .refining import Polynomial
 from .verify_certificate import KINDS, CertificateRejection, cross, dot, integral, rational, slope
@@ -34,8 +35,6 @@ NORMAL_DENOMINATOR_COUNT = 1024
 """How finely normals are turned to be at right angles."""
 STARTS, SETS, ITERATIONS = 64, 20, 60
 """Random starts at once, how often, and Newton's steps from them."""
-REACHED, SAME = 1e-10, 1e-6
-"""The last of Newton's steps at a solution, and how far two proposals of one are apart at most."""
 ZERO_TO_GOAL_OFFSET_RAD = 0.6
 """Rotation of the zero position of each next joint of a leg from the goal (rad)."""
 
@@ -58,22 +57,12 @@ class ToldChain:
         """With the list's modes by their coordinates (rad, sizes)."""
         slides = np.array([kind == "P" for kind, *_ in record["joints"][: record["unknowns"]]])
         places = [np.where(slides, np.real(start), 2.0 * np.arctan(np.real(start))) for start, real in starts if real]
-        return cls(
-            record,
-            starts,
-            [
-                next(
-                    (
-                        k
-                        for k, x in enumerate(found)
-                        if np.abs(np.where(slides, x[: len(q)] - q, np.exp(1j * (x[: len(q)] - q)) - 1.0)).max() < SAME
-                    ),
-                    None,
-                )
-                for q in places
-            ],
-            home,
-        )
+
+        def is_at(x: Array, q: Array) -> bool:
+            return bool(measure_joint_distances(slides, x[: len(q)], q) < SAME_ZERO_DISTANCE_TOL)
+
+        modes = [next((k for k, x in enumerate(found) if is_at(x, q)), None) for q in places]
+        return cls(record, starts, modes, home)
 
 
 def chains(system: CarriedPlatform, found: Sequence[Array]) -> Iterator[ToldChain]:
@@ -201,32 +190,25 @@ def _solve_loop(record: dict[str, Any]) -> Starts:
     """About where all solutions of a loop's equations are, by Newton's method from random complex starts, as many as
     the degrees allow (a permanent)."""
     equations = [integral(p) for p in KINDS["chain"][0](record, rational(record["tips"]))[0]]
-    n, found, rng = len(equations), list[Array](), np.random.default_rng(0)
+    n, rng = len(equations), np.random.default_rng(0)
     most = permanent(np.array([[max(e[k] for e in p) for k in range(n)] for p in equations]))
     values, slopes = [_float(p) for p in equations], [[_float(slope(p, k), p) for k in range(n)] for p in equations]
-    for _ in range(SETS):
+
+    def evaluate(x: Array) -> tuple[Array, Array]:
+        J = [np.stack([f(x) for f in row], axis=-1) for row in slopes]
+        return np.stack([f(x) for f in values], axis=-1), np.stack(J, axis=-2)
+
+    def draw() -> Array:
         x = rng.normal(size=(STARTS, n)) + 1j * rng.normal(size=(STARTS, n))
         x[0] = 0.0
-        step = x
-        with np.errstate(all="ignore"):
-            for _ in range(ITERATIONS):
-                F = np.stack([f(x) for f in values], axis=-1)
-                J = np.stack([np.stack([f(x) for f in row], axis=-1) for row in slopes], axis=-2)
-                step = np.einsum("kij,kj->ki", np.linalg.pinv(J), F)
-                x = x - step / np.maximum(1.0, np.abs(step).max(axis=1))[:, None]
-                good = np.all(np.isfinite(x), axis=1) & (np.abs(x).max(axis=1) < 1e8)
-                x, step = x[good], step[good]
-        for each in x[np.abs(step).max(axis=1) < REACHED]:
-            for z in (each, each.conj()):
-                if all(np.abs(z - y).max() > SAME for y in found):
-                    found.append(z)
-        if len(found) >= most:
-            break
+        return x
+
+    ends = (approach_zeros(evaluate, draw(), steps=ITERATIONS, longest=1.0) for _ in range(SETS))
+    found = collect_zeros(ends, most)
     turns = [kind == "R" for kind, *_ in record["joints"][:n]]
-    return [
-        (z.tolist(), None if np.abs(z * z + 1.0)[turns].min(initial=1.0) < SAME else bool(np.abs(z.imag).max() < SAME))
-        for z in found
-    ]
+    is_far = np.abs(found * found + 1.0)[:, turns].min(axis=1, initial=1.0) < SAME_ZERO_DISTANCE_TOL
+    is_real_ = np.abs(found.imag).max(axis=1) < SAME_ZERO_DISTANCE_TOL
+    return [(z.tolist(), None if far else bool(real)) for z, far, real in zip(found, is_far, is_real_, strict=True)]
 
 
 def _float(p: Polynomial, whole: Polynomial | None = None) -> Any:

@@ -31,7 +31,6 @@ from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism import Mechanism
 from ..mechanism.pose import Pose
-from ..tolerances import EXTRANEOUS_START_TOL
 from .bounds import bound
 from .chains import chains
 from .closures import ClosedRobot, write_numbers
@@ -40,6 +39,9 @@ from .proposed import ProposedRecord
 from .refining import Polynomial, ScaledEquations
 from .system_records import propose
 from .verify_certificate import KINDS, CertificateRejection, digest, integral, rational, told, value, verify
+
+EXTRANEOUS_START_TOL = 1e-6
+"""Residual of extraneous starts, and distance between two of them (both relative)."""
 
 RADIUS = Fraction(1, 1 << 80)
 """Radius of the boxes (unknowns of size one)."""

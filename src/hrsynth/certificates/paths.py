@@ -15,7 +15,7 @@ from ..analysis.aspects.path_segments import StraightSegment
 from ..analysis.aspects.vector_expressions import DerivedVector, LegVector, VectorExpression, collect_subchains
 from ..analysis.aspects.verdicts import SEPARATED
 from ..analysis.observed import ObservedRobot
-from ..closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
+from ..closed_forms.legs import ClosedFormLeg
 from ..closed_forms.platform_points import PlatformPoint
 from ..constraints.condition import NamedCondition
 from ..errors import NoCertificate
@@ -188,25 +188,11 @@ def _is_proved(record: dict[str, Any], one: Node, other: Node) -> bool:
 
 def _leg(limb: ClosedFormLeg) -> dict[str, Any]:
     """A leg without its working mode."""
-    found = {"tip": _rule(limb.tip), "centre": write_numbers(limb.centre)}
-    if isinstance(limb, OnCrank):
-        return {
-            "kind": "crank",
-            "axis": write_numbers(limb.axis),
-            "radius": write_numbers(float(limb.radius)),
-            "rod": write_numbers(float(limb.rod)),
-            **found,
-        }
-    if isinstance(limb, OnRail):
-        return {"kind": "rail", "axis": write_numbers(limb.axis), "rod": write_numbers(float(limb.rod)), **found}
-    if isinstance(limb, SlidingRod):
-        return {
-            "kind": "slide",
-            "axis": None if limb.axis is None else write_numbers(limb.axis),
-            "aside": write_numbers(float(limb.aside)),
-            **found,
-        }
-    raise PathRejection("a leg of a kind that the checker does not support")
+    if not limb.record:
+        raise PathRejection("a leg of a kind that the checker does not support")
+    kind, *names = limb.record
+    numbers = {name: None if (value := getattr(limb, name)) is None else write_numbers(value) for name in names}
+    return {"kind": kind, **numbers, "tip": _rule(limb.tip), "centre": write_numbers(limb.centre)}
 
 
 def _rule(point: PlatformPoint) -> list[Any]:

@@ -12,6 +12,7 @@ import math
 import random
 from collections.abc import Sequence
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from ..analysis.modes.quadrics import COORDINATE_BITS_COUNT, PoseSystem
 from ..analysis.modes.rigid import Spatial
 from ..geometry.so3 import convert_to_quaternions
 from ..geometry.vectors import Array
+from ..solving.newton import approach_zeros
 from .closures import write_numbers
 from .refining import Polynomial, ScaledEquations
 from .verify_certificate import KINDS, CertificateRejection, conditions, integral, poses, rational, reach_of
@@ -207,13 +209,10 @@ class _Floats:
     def near(self, by: complex, x: Any) -> Any:
         """Solutions (n, 7) near others; not finite where they are not found."""
         terms = [(e, by ** np.arange(PERTURBED_EQUATION_DEGREE_COUNT + 1) @ C) for e, C in self.terms]
-        with np.errstate(all="ignore"):
-            for _ in range(PERTURBED_NEWTON_STEPS_COUNT):
-                x = self._step(terms, x)
-        return x
+        return approach_zeros(partial(self._evaluate, terms), x, steps=PERTURBED_NEWTON_STEPS_COUNT).x
 
     @staticmethod
-    def _step(terms: Sequence[Any], x: Any) -> Any:
+    def _evaluate(terms: Sequence[Any], x: Array) -> tuple[Array, Array]:
         powers = np.stack([np.ones_like(x), x, x * x, x**3, x**4, x**5, x**6], axis=-1)
         F, J = np.zeros(x.shape, dtype=complex), np.zeros((*x.shape, x.shape[1]), dtype=complex)
         k = np.arange(x.shape[1])
@@ -223,7 +222,4 @@ class _Floats:
                 down = e - (k == j)
                 J[:, row, j] = powers[:, k, np.maximum(down, 0)].prod(axis=2) @ (c * e[:, j])
         scale = np.abs(J).max(axis=2) + 1e-300
-        try:
-            return x - np.linalg.solve(J / scale[:, :, None], (F / scale)[:, :, None])[:, :, 0]
-        except np.linalg.LinAlgError:
-            return np.full_like(x, np.nan)
+        return F / scale, J / scale[:, :, None]

@@ -15,7 +15,7 @@ from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..records import DEG, MM, As, Number, Shown
 from ..results import Value
-from ..simulation.equilibria.attraction_radius import CertifiedRadius, certified_radius
+from ..simulation.equilibria.attraction_radius import AttractionRadius, prove_attraction_radius
 from ..simulation.equilibria.equilibria import EquilibriumSearch
 from ..simulation.equilibria.equilibrium import CRITICAL
 from ..simulation.outcome import GOAL
@@ -28,7 +28,7 @@ class LoopEnds(Value):
     reason for what is unknown."""
 
     others: Annotated[tuple[str, ...] | None, As("kinds")]
-    radius: CertifiedRadius | None
+    radius: AttractionRadius | None
     why: str = ""
 
     @classmethod
@@ -39,7 +39,7 @@ class LoopEnds(Value):
             others = tuple(sorted(each.kind for each in found.stable if each.kind != GOAL and not each.beyond_limits))
             if not all(each.is_segment_direction for each in setup.observed):
                 return cls(others, None, "the attraction radius is computed for directions of segments only")
-            radius = certified_radius(setup, goal)
+            radius = prove_attraction_radius(setup, goal)
         except HrsynthError as error:
             return cls(None, None, str(error))
         return cls(others, radius, "" if radius.length else radius.reason)
@@ -68,7 +68,7 @@ class LoopEnds(Value):
         )
         return kinds or "none"
 
-    attracting = Shown(int | None, lambda self: None if self.others is None else len(self.others))
+    stable = Shown(int | None, lambda self: None if self.others is None else len(self.others))
     radius_mm = Shown(Number, lambda self: self.length or None, As(scale=MM))
     radius_deg = Shown(Number, lambda self: self.radius.angle if self.length else None, As(scale=DEG))
     reason = Shown(str | None, lambda self: self.why or None)

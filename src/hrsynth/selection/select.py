@@ -19,20 +19,11 @@ from ..analysis.aspects.path import PathPlanner
 from ..analysis.aspects.verdicts import SEPARATED
 from ..analysis.configuration_report import ConfigurationAnalysis, ConfigurationReport
 from ..analysis.modes.modes import AssemblyModes, modes
-from ..analysis.observed import (
-    UNLIMITED,
-    CameraLike,
-    LegsLike,
-    NoiseLike,
-    ObservedRobot,
-    RobotLike,
-    Seed,
-    SensorLike,
-    StartPose,
-)
+from ..analysis.observation_inputs import CameraLike, LegsLike, NoiseLike, Seed, SensorLike, StartPose
+from ..analysis.observed import ObservedRobot, RobotLike
 from ..analysis.pose_requests import solve_configurations
+from ..analysis.setup_records import LIMITS_IGNORED
 from ..analysis.verdict import CONTROLLABLE, compute_verdict
-from ..budgets import SELECT_EQUILIBRIUM_ROUNDS_COUNT, VISIBLE_AXIS_MIN_FRACTION
 from ..errors import BadRequest, HrsynthError
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
@@ -51,6 +42,11 @@ from ..simulation.outcome import GOAL
 from ..simulation.servo import servo
 from .loop_ends import LoopEnds, explain_smaller_set
 from .sight import CameraView, make_camera, parse_camera_pose
+
+SELECT_EQUILIBRIUM_ROUNDS_COUNT = 4
+"""Rounds for each set of legs of which the best is selected."""
+VISIBLE_AXIS_MIN_FRACTION = 0.5
+"""Fraction of a leg's axis that must be visible."""
 
 SELECT_PATH_INTERVALS_MAX = 2_000
 """Largest number of intervals of a path's certificate."""
@@ -268,13 +264,12 @@ class Selection(Result, shown_as="select"):
     noise = Shown(dict[str, float], lambda self: self.bounds.amounts, "by its unit (px, m, rad)")
     best = Shown(list[str] | None, lambda self: self.kept[0].legs if self.kept else None)
     not_examined = Shown(UnexaminedSets, lambda self: {"count": len(self.unexamined), "reason": self.left})
-    limits_ignored = Shown(list[str], lambda self: self.setup.limits_ignored, UNLIMITED)
+    limits_ignored = LIMITS_IGNORED
 
 
 @analysis(
     140,
     examples=("quattro --start x=0.1 --goal x=-0.05,phi=20deg",),
-    cones="cone",
 )
 @by_name(Criteria, "criteria")
 def select(
@@ -345,7 +340,7 @@ def select(
     <Selection: 3rrr_m1: 7 sets, 1 kept, best 1, 2, 3>
     """
     wanted = [parse_pose(each) for each in (start, goal)]
-    setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed).telling(wanted)
+    setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed).printing_like(wanted)
     others = not all(o.is_segment_direction for o in setup.observed)
     if others and criteria.visible_from is not None:
         setup.by_segments("select with --visible-from")
@@ -424,7 +419,7 @@ class _Work:
             analysis = ConfigurationAnalysis.of(setup)
             ends = (("start", self.start), ("goal", self.goal))
             behind = [(name, find_invisible(at, setup.samples.observation_model)) for name, at in ends]
-            reasons = [f"{o.kind} {o.leg} is not in front of its camera at the {name}" for name, o in behind if o]
+            reasons = [f"{o.text} is not in front of its camera at the {name}" for name, o in behind if o]
             if reasons:
                 return Candidate(legs, verdict.verdict, reasons[0])
             reasons = [

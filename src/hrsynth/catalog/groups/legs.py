@@ -27,7 +27,8 @@ def drive_first_joint(chain: LegKey) -> LegKey:
 
 
 def list_observed_segments(chain: LegKey) -> Iterator[LegKey]:
-    """The leg with each segment observed in turn, one of those that always turn alike."""
+    """Return the leg once for each segment that can be observed; of segments that always have the same orientation
+    (only P joints between them) one is taken."""
     last = len(chain.joints) - (1 if chain.joints[-1].letter in COMPOSITE else 2)
     seen = (
         LegKey(tuple(replace(joint, watched=i == place) for i, joint in enumerate(chain.joints))).canonical
