@@ -16,7 +16,7 @@ import hrsynth
 from hrsynth import load
 from hrsynth.cli import app, run_command
 from hrsynth.cli.analyses import FIGURE, QUESTIONS
-from hrsynth.cli.options import JSON, SOURCE
+from hrsynth.cli.options import EXPLAIN, JSON, SOURCE
 from hrsynth.errors import BadRequest
 from hrsynth.present.outputs import OUTPUTS, get_outputs, load_function
 from hrsynth.results import Result
@@ -74,7 +74,7 @@ def test_each_option_goes_somewhere(question):
         *signature(getattr(hrsynth, question.name)).parameters,
         *(file.option for file in files),
         *(name for file in files for name in file.takes),
-        *(option.name for option in (*SOURCE, *FIGURE, JSON)),
+        *(option.name for option in (*SOURCE, *FIGURE, JSON, EXPLAIN)),
     }
     if question.shows is not None:
         known |= set(signature(question.shows).parameters)

@@ -19,10 +19,9 @@ from ..simulation.crossings import TYPE_2
 from ..simulation.mujoco_model import rods as rods_of
 from ..simulation.rendered_images import LINK_GREY_FRACTION, LegRenderer
 from ..simulation.result import Servo
-from ..tolerances import DRAWN_ERROR_MIN_FRACTION
 from . import palette
 from .plots import describe_pose, in_style, make_empty_figure
-from .runs import DRAWN_ROTATION_DEGREES_MIN, ENDS, find_end_time
+from .runs import DRAWN_ERROR_MIN_FRACTION, DRAWN_ROTATION_DEGREES_MIN, ENDS, find_end_time
 from .text.tables import name_all
 
 FRAMES, PAUSE = 50, 12
@@ -87,7 +86,7 @@ def require_legs(setup: ObservedRobot, **_: Any) -> None:
         if not each.is_segment_direction:
             raise BadRequest(
                 f"{setup.robot.name}: an animation shows observed legs only",
-                f"{each.kind} {each.leg}",
+                each.text,
                 remedy="Write a figure (.png, .pdf, .svg), which shows all kinds.",
             )
 

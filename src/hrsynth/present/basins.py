@@ -12,7 +12,6 @@ from ..geometry.vectors import Array
 from ..simulation.equilibria.basins import LETTERS, NOT_REACHED, BasinEnd, Basins, place_of
 from ..simulation.equilibria.flow import Flags, Places
 from ..simulation.outcome import ANTIPODAL, BOUNDARY, GOAL, MINIMUM, MODE, SIGHT, TIME, UNDECIDED
-from ..tolerances import DRAWN_PLANE_DISTANCE_TOL
 from . import palette, plots
 from .figure_format import PNG, Paper, print_figure
 from .palette import SERIES
@@ -30,6 +29,9 @@ from .pose_map import PoseMap
 from .runs import ENDS
 from .sketch import label_axis
 from .text.tables import encode_csv
+
+DRAWN_PLANE_DISTANCE_TOL = 1e-3
+"""Distance (characteristic lengths, radians) up to which the end of runs is drawn in a plane."""
 
 SHADES = {
     GOAL: (palette.make_tint(palette.get_colour("goal"), 0.55), palette.make_tint(palette.get_colour("goal"), 0.25)),

@@ -15,7 +15,6 @@ from ..analysis.singularity.locus import Locus
 from ..errors import BadRequest
 from ..geometry.vectors import Array
 from ..mechanism.pose import PARTS
-from ..tolerances import DARKEST_SINGULAR_VALUE_MAX, MAP_DISTANCE_FLOOR_FRACTION
 from . import palette, plots
 from .figure_format import PNG, Paper, print_figure
 from .plots import (
@@ -42,6 +41,11 @@ if TYPE_CHECKING:
     from ..analysis.singularity.singularities import Singularity
     from ..kinematics.platform_motion import PlatformMotion
     from ..mechanism.pose import Grid, Pose
+
+MAP_DISTANCE_FLOOR_FRACTION = 1e-3
+"""Fraction of the largest singularity distance on a map below which the colour is constant."""
+DARKEST_SINGULAR_VALUE_MAX = 1e-6
+"""Singular value below which the grey behind a locus is darkest."""
 
 MARKS = {
     "type1": ("^", "Type 1"),

@@ -189,7 +189,7 @@ class CodeFile(File):
     def require(self, path: str | None, asked: Asked) -> None:
         """Raise ``BadRequest`` also for the suffix of another language."""
         super().require(path, asked)
-        endings = (".py",) if asked["lang"] == "numpy" else (".hpp", ".h")
+        endings = (".py",) if asked["lang"] == "python" else (".hpp", ".h")
         if path is not None and Path(path).suffix.lower() not in endings:
             raise BadRequest(
                 f"{self.refusal} of --lang {asked['lang']}: extension",
@@ -247,10 +247,7 @@ OUTPUTS = {
                 "cannot draw the aspects",
                 map_figure_endings("aspects:draw_aspects"),
                 "The figure of the aspects",
-                "Draw the table and, for three rods on cranks in a plane, the singular curve with the modes: "
-                "aspects.png, .pdf, .svg.",
-                computed="aspects:compute_section",
-                record="section",
+                "Draw the table of pairs of modes: aspects.png, .pdf, .svg.",
                 nothing="aspects:explain_no_table",
                 drawn=True,
             ),
@@ -324,7 +321,7 @@ OUTPUTS = {
                 "cannot write the code",
                 dict.fromkeys((".hpp", ".h", ".py"), "text.robots:encode_program"),
                 "The code",
-                "Write the code: robot.hpp (C++), robot.py (NumPy).",
+                "Write the code: robot.hpp (C++), robot.py (Python).",
                 plotted=(),
             ),
         ),

@@ -15,7 +15,6 @@ from ..simulation.crossings import TYPE_2
 from ..simulation.outcome import ANTIPODAL, BOUNDARY, MINIMUM, MODE, SIGHT, TIME, UNDECIDED
 from ..simulation.outcome import GOAL as GOAL_REACHED
 from ..simulation.result import Servo
-from ..tolerances import DRAWN_ERROR_MIN_FRACTION, DRAWN_MOTION_TOL
 from . import palette
 from .figure_format import PNG, Paper, draw_legend_within, print_figure, wrap, wrap_title
 from .palette import SERIES
@@ -24,6 +23,11 @@ from .skeleton import trace_leg_outlines, trace_link_outline
 from .sketch import Box, Sketch
 from .view.sights import VIEW_HALF_LENGTH_FRACTION, compute_half_image, list_cameras
 from .view.view import find_plane_normal
+
+DRAWN_MOTION_TOL = 1e-9
+"""Motion (metres, radians) below which a platform is drawn as not moving along a coordinate."""
+DRAWN_ERROR_MIN_FRACTION = 1e-3
+"""Fraction of the largest error below which a run is not drawn further."""
 
 STYLES = ("solid", "dashed", "dashdot", "dotted", "solid", "dashed")
 WIDE, TALL, LEAST_TALL, NARROW = 12.0, 7.4, 5.4, 8.0

@@ -85,13 +85,14 @@ def text(result: Result) -> str:
 
 
 def format_record(command: str, robot: Mechanism | None, fields: dict[str, Any]) -> str:
-    """Return the JSON text of a command: one object with ``command`` and ``version``, and the name and platform of the
-    ``robot`` if it concerns one (no NaN, no infinity)."""
+    """Return the JSON text of a command: one object with ``command`` and ``version``, and the name, platform and
+    notes of the ``robot`` if it concerns one (no NaN, no infinity)."""
     head: dict[str, Any] = {}
     if robot is not None:
         chosen = None if robot.choice is None else {"chosen": robot.choice.chosen, "reason": robot.choice.reason}
         link = None if robot.has_open_platform else robot.platform
         head = {"robot": robot.name, "platform": {"link": link, **(chosen or {})}}
+        head |= {"notes": [str(note) for note in robot.notes]} if robot.notes else {}
     text = io.StringIO()  # json.dumps keeps all small pieces of the text at once
     json.dump(
         {**head, "command": command, "version": __version__, **fields},

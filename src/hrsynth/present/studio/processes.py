@@ -15,7 +15,12 @@ from dataclasses import dataclass, field
 from threading import Lock
 from typing import Any
 
-from ...budgets import LARGEST_ANSWER, STUDIO_WAITING_REQUESTS_MAX, WORKER_START_TIMEOUT_S
+from ...tolerances import LARGEST_ANSWER
+
+STUDIO_WAITING_REQUESTS_MAX = 64
+"""Largest number of waiting requests of a tab."""
+WORKER_START_TIMEOUT_S = 60.0
+"""Time limit for the start of a process (s)."""
 
 DESK = "hrsynth.present.studio.analysis_service:AnalysisService"
 """Class that answers."""

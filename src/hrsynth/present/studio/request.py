@@ -14,7 +14,6 @@ import numpy as np
 from ...analysis.derive import Derivation, derive
 from ...analysis.observed import ObservedRobot
 from ...analysis.pose_requests import observe
-from ...budgets import CACHED_OBSERVED_ROBOTS_COUNT, POSE_VALUE_MAX, STUDIO_LIST_NAMES_MAX, STUDIO_NAME_CHARACTERS_MAX
 from ...description import list_robots, load
 from ...description.example_data import PREFIX
 from ...errors import BadRequest, LoopClosureFailure
@@ -23,11 +22,16 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.pinocchio_model import PinocchioModel
 from ...mechanism import Mechanism
 from ...results import Value
-from ...tolerances import HIDDEN_ROBOT_RESIDUAL_TOL
+from ...tolerances import CACHED_OBSERVED_ROBOTS_COUNT, HIDDEN_ROBOT_RESIDUAL_TOL, POSE_VALUE_MAX
 from ..view.states import Mover, RealAndHiddenState
 
+STUDIO_NAME_CHARACTERS_MAX = 500
+"""Longest name in a request of the studio (characters)."""
+STUDIO_LIST_NAMES_MAX = 200
+"""Longest list of names in a request."""
+
 SHIPPED, FILE, FOLDER, GIVEN = "shipped", "file", "folder", "given"
-LISTS, TEXTS = ("motors", "close", "freeze"), ("base", "platform", "keyframe", "unit")
+LISTS, TEXTS = ("motors", "close", "freeze", "args"), ("base", "platform", "keyframe", "unit", "model")
 OPTIONS = (*TEXTS, *LISTS, "tolerance", "as_written")
 """Options of a robot file in a request, as in ``hrsynth.load``."""
 

@@ -17,10 +17,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...budgets import LARGEST_ASK, SENDER_TIMEOUT_S, SERVER_CLOSE_TIMEOUT_S, STUDIO_CONNECTIONS_MAX
 from ...errors import BadRequest, FileTooLarge, HrsynthError, MissingExtra
 from ...processes import require_posix
 from ...results import with_spelling
+from ...tolerances import SENDER_TIMEOUT_S
 from .. import palette
 from .guard import HOST, Guard
 from .processes import DESK, ForkServer
@@ -33,6 +33,13 @@ if TYPE_CHECKING:
 
     from ...mechanism import Mechanism
     from ..view.view import View
+
+STUDIO_CONNECTIONS_MAX = 100
+"""Largest number of connections to the server."""
+LARGEST_ASK = 256 * 1024
+"""Largest message of the page (bytes)."""
+SERVER_CLOSE_TIMEOUT_S = 2.0
+"""Time that open connections have when the server ends (s)."""
 
 PAGE = Path(__file__).parent / "page"
 TYPES = {

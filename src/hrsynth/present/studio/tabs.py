@@ -13,7 +13,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...budgets import MOVE_TIMEOUT_S, REQUEST_TIMEOUT_S, STUDIO_TABS_MAX
 from .processes import ForkServer, WorkerProcess, cancel_message, format_gone
 from .uploads import UploadFolder
 
@@ -21,6 +20,13 @@ if TYPE_CHECKING:
     from starlette.websockets import WebSocket
 
     from ...mechanism import Mechanism
+
+STUDIO_TABS_MAX = 8
+"""Largest number of tabs served at once, with two processes each."""
+MOVE_TIMEOUT_S = 10.0
+"""Time limit of a move of the robot (s); its process then ends."""
+REQUEST_TIMEOUT_S = 120.0
+"""Time limit of any other request (s)."""
 
 SOCKET_TRY_LATER_CODE = 1013
 """Close code of a socket if too many are open."""

@@ -9,8 +9,17 @@ import secrets
 from collections.abc import AsyncIterator
 from pathlib import Path
 
-from ...budgets import FILE_NAME_MAX_BYTES, SENDER_TIMEOUT_S, UPLOAD_MAX_BYTES, UPLOAD_TIMEOUT_S, UPLOADED_FILES_MAX
 from ...errors import BadRequest, FileTooLarge
+from ...tolerances import SENDER_TIMEOUT_S
+
+UPLOAD_MAX_BYTES = 20_000_000
+"""Largest file dropped into the page (bytes)."""
+UPLOADED_FILES_MAX = 50
+"""Largest number of files of a tab."""
+FILE_NAME_MAX_BYTES = 200
+"""Longest name of such a file (bytes)."""
+UPLOAD_TIMEOUT_S = 60.0
+"""Time limit for a whole file (s)."""
 
 NAME = re.compile(r"\w[\w .,()+@-]*")
 """A name without folders and odd characters."""

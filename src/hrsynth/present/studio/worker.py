@@ -23,9 +23,12 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from ...budgets import LARGEST_ANSWER, WORKER_BYTES
 from ...characters import name_steering, restore_steering
 from ...errors import HrsynthError
+from ...tolerances import LARGEST_ANSWER
+
+WORKER_BYTES = 4 * 1024**3
+"""Address space of such a process (bytes)."""
 
 FRAME = struct.Struct("!I")
 READY = b"{}"

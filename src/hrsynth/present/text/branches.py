@@ -93,6 +93,8 @@ def _format_part(part: BranchPart) -> Rows:
     ]
     if not whole:
         rows.append(("proved box", bounds))
+    if part.unsure:
+        rows.append(("rods", f"turns not proved to have one value in all cells: {', '.join(part.unsure)}"))
     rows += [
         (f"turn of {name}", "the branch returns to itself" if same else "the branch does not return to itself")
         for name, same in part.turns

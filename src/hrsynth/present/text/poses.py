@@ -145,7 +145,8 @@ def _list_free_parts(grid: GridCheck) -> Iterator[str]:
 def _format_configuration(posture: ConfigurationReport, length: float, setup: ObservedRobot) -> Rows:
     shown = "directions" if all(each.is_segment_direction for each in setup.observed) else "observations"
     mobility, far, dof = posture.mobility, posture.distances, posture.dof
-    whose = "bodies have" if setup.mechanism.formation else "platform has"
+    turns = f", {posture.turns or 'none'} of which rotate{'s' * (posture.turns < 2)} it" if dof else ""
+    whose = f"bodies have {dof} dof" if setup.mechanism.formation else f"platform has {dof} dof{turns}"
     rows = [
         *format_joint_rows(posture.coordinates, posture.beyond_limits),
         *(
@@ -156,10 +157,7 @@ def _format_configuration(posture: ConfigurationReport, length: float, setup: Ob
             )
             for name, angle in posture.singular_spherical_joints.items()
         ),
-        (
-            "mobility",
-            f"{mobility.total}, of which {mobility.internal} internal; the {whose} {dof} dof",
-        ),
+        ("mobility", f"{mobility.total}, of which {mobility.internal} internal; the {whose}"),
         *_format_kinds(
             "hidden robot",
             f"the {shown} show {posture.hidden.rank} of {dof}",

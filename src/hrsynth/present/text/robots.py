@@ -8,6 +8,7 @@ from math import comb, degrees, prod
 from typing import TYPE_CHECKING
 
 from ...analysis.exact import ExactVerdict, round_up_power
+from ...analysis.setup_records import describe_other_modes
 from ...analysis.verdict import ELSEWHERE
 from ...errors import HrsynthError
 from ...tolerances import NONZERO_SINGULAR_VALUE_MIN, RANK_CUTOFF_FRACTION, RANK_GAP_MIN, RELATION_ANGLE_TOL
@@ -192,16 +193,10 @@ def format_formation(found: Formation | None) -> Rows:
 
 def _describe_modes(observed: ObservedRobot) -> list[str]:
     """Name the operation mode of a verdict, if others were found."""
-    found = observed.beside()
-    own = observed.all_samples.signature
-    return (
-        [
-            f"that of the zero configuration: {own.dof} dof ({own.motion}), mobility {own.mobility}",
-            *(f"another that was found: {text}" for text in found),
-        ]
-        if found
-        else []
-    )
+    signature = observed.all_samples.signature
+    zero = f"{signature.dof} dof ({signature.motion}), mobility {signature.mobility}"
+    others = [f"another that was found: {text}" for text in describe_other_modes(observed)]
+    return [f"that of the zero configuration: {zero}", *others] if others else []
 
 
 def describe_near_verdict(found: Verdict) -> str:
@@ -327,25 +322,23 @@ def format_legs(found: Legs) -> str:
 
 def describe_export(found: ExportedCode) -> str:
     """Return the robot, the units and the proved domain of exported code."""
-    proof, bounds = found.proof, found.bounds
+    proof = found.proof
     rows: Rows = [
         format_robot_row(proof.robot),
         ("language", found.lang),
         ("motors", ", ".join(proof.motors)),
         ("joints", f"{len(proof.passive)} passive, {len(proof.fixed)} internal (fixed)"),
         ("directions", ", ".join(found.legs) or "none"),
-        ("inverse", "in closed form" if found.closed else "by Newton's method, from nearby motor positions"),
-        (
-            "steps",
-            [
-                f"{bounds.steps} Newton steps are enough, and a solution is within {bounds.error:.2g} of",
-                "the closure (rad, 1 or characteristic lengths), rounding included, proved",
-                *([f"whether {bounds.more} is checked at run time"] if bounds.others else []),
-            ]
-            if bounds
-            else "not bounded in all cells: unconfirmed solutions are reported as undecided",
-        ),
     ]
+    if found.lang == "c++":
+        lines = ["each continues the last one, proved at run time over the whole step,", "or is not given"]
+        rows.append(
+            ("answers", lines + ["forward, jump: for any motors in the cells, proved in advance"] * found.jumps)
+        )
+    if found.jumps:
+        rows.append(
+            ("inverse", "in closed form" if found.closed else "by Newton's method, from nearby motor positions")
+        )
     rows.append(("units", UNITS))
     for part in proof.parts:
         rows.append(

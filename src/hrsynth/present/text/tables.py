@@ -96,14 +96,18 @@ def format_known_row(name: str, value: str | None) -> Rows:
 
 def format_joint_rows(found: FileCoordinates | None, beyond: Sequence[str] = ()) -> Rows:
     """Return the rows of motor and joint coordinates of a configuration, and of those beyond joint limits."""
+    from ...mechanism.pose import format_coordinates
+
     rows = [] if found is None else [("motors", found.motors), ("joints", found.joints)]
-    told = [(name, ", ".join(f"{joint} {write_value(x)}" for joint, x in each.items())) for name, each in rows if each]
+    told = [
+        (name, ", ".join(f"{joint} {format_coordinates(x)}" for joint, x in each.items()))
+        for name, each in rows
+        if each
+    ]
+    if found is not None and found.line is not None:
+        meaning = ": the straight line of these coordinates from zero leads here, by one continuation"
+        told.append(("line", found.line + meaning * (found.line == "proved")))
     return [*told, *format_known_row("limits", f"exceeded: {', '.join(beyond)}" if beyond else None)]
-
-
-def write_value(value: float | tuple[float, ...]) -> str:
-    """Format the coordinate or coordinates of a joint."""
-    return "/".join(f"{round(x, 9) + 0.0:.6g}" for x in (value if isinstance(value, tuple) else (value,)))
 
 
 def format_dropped_limits(setup: ObservedRobot) -> Rows:
@@ -148,14 +152,14 @@ def describe_observation(observation: Observation) -> str:
 def describe_watched(found: ObservedRobot) -> dict[str, list[str]]:
     """Return the observed links of each leg with the axis in the link frame, and the reason of the choice."""
     from ...analysis.freedoms import format_point
+    from ...analysis.setup_records import list_observed_axes
 
     told: dict[str, list[str]] = {}
-    for o, why in found.observed_axes():
-        said = o.to_dict()
+    for o, said in zip(found.observed, list_observed_axes(found), strict=True):
         places = {"at": said["at"], "along": said["axis"]}
         where = "".join(f" {word} {format_point(at)}" for word, at in places.items() if at is not None)
         what = o.link if o.is_segment_direction else describe_observation(o)
-        told.setdefault(o.leg, []).append(f"{what}{where}{' of its frame' * bool(where)}, {why}")
+        told.setdefault(o.leg, []).append(f"{what}{where}{' of its frame' * bool(where)}, {said['reason']}")
     return told
 
 

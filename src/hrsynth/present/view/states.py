@@ -14,7 +14,6 @@ import numpy as np
 
 from ...analysis.configuration_report import ConfigurationAnalysis
 from ...analysis.observed import ObservedRobot
-from ...budgets import DRAG_APPROACH_STEPS_COUNT, VIEW_TRACKING_ITERATIONS_MAX
 from ...geometry.vectors import Array, invert_pose
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.continuation import approach, track
@@ -29,6 +28,11 @@ from ...tolerances import CLOSURE_SOLVER_TOL, HIDDEN_ROBOT_RESIDUAL_TOL
 from .scale import describe_pose_error
 from .shapes import PAGE_DIGITS_COUNT
 from .sights import ShownSight, list_shown_observations
+
+VIEW_TRACKING_ITERATIONS_MAX = 60
+"""Iterations in which a hidden robot follows the real one in the view."""
+DRAG_APPROACH_STEPS_COUNT = 8
+"""Steps by which a dragged platform approaches its target after the straight path ends."""
 
 REAL, HIDDEN = "real", "hidden"
 TURN, WAY = 1.0, 1.0

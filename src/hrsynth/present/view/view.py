@@ -11,7 +11,8 @@ import numpy as np
 
 from ...analysis.analysis_declaration import analysis
 from ...analysis.derive import Derivation, derive
-from ...analysis.observed import POINTS, CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SensorLike
+from ...analysis.observation_inputs import POINTS, CameraLike, LegsLike, Seed, SensorLike
+from ...analysis.observed import ObservedRobot, RobotLike
 from ...geometry.vectors import Array, orient_axis
 from ...kinematics.coordinates import Coordinates
 from ...kinematics.platform_motion import PlatformMotion

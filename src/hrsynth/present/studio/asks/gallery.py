@@ -55,7 +55,8 @@ def draw_thumbnail(robot: Mechanism) -> str:
 
 
 def find_confining_plane(robot: Mechanism) -> Array | None:
-    """Return the normal of the plane to which the joints of a robot confine it, None if they do not."""
+    """Return the normal of the plane of motion if all joints are R along one direction and P across it (at least one
+    R), else None."""
     turns = [joint.axis for joint in robot.joints.values() if joint.type is JointType.REVOLUTE]
     slides = [joint.axis for joint in robot.joints.values() if joint.type is JointType.PRISMATIC]
     if not turns or len(turns) + len(slides) < len(robot.joints):

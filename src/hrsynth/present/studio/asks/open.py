@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from ....analysis.observed import ObservedRobot
+from ....analysis.setup_records import describe_other_modes
 from ....description import find_robot_file
 from ....description.assembly.choices import ImportChoices, choices
 from ....description.overrides import UNITS, Overrides
@@ -64,7 +65,7 @@ def describe_opened(request: Request) -> dict[str, Any]:
         "sliders": make_sliders(mover, request.ends),
         "scale": scale(choose_error_unit(setup)),
         **describe_pose(request, mover, here),
-        "notes": [*map(str, setup.robot.notes), *setup.beside(), *missing],
+        "notes": [*map(str, setup.robot.notes), *describe_other_modes(setup), *missing],
         **format_commands(request, "derive"),
     }
 
@@ -123,6 +124,8 @@ def list_assumptions(request: Request) -> ImportChoices | None:
             close=said.get("close", ()),
             freeze=said.get("freeze", ()),
             unit=said.get("unit"),
+            args=said.get("args", ()),
+            model=said.get("model"),
         )
         return choices(find_robot_file(request.source.robot), given)
     except HrsynthError:

@@ -15,7 +15,6 @@ from ....analysis.accuracy.measurement_bounds import MeasurementBounds
 from ....analysis.accuracy.pose_errors import search_largest_errors
 from ....analysis.singularity.condition_check import compute_smallest_value
 from ....batch.pose_continuation import spread
-from ....budgets import POSE_VALUE_MAX, STUDIO_PLANE_SIDE_MAX, STUDIO_SWEEP_SIDE_MAX
 from ....errors import BadRequest
 from ....geometry.vectors import Array, convert_to_lists
 from ....kinematics.configuration import ClosedConfiguration
@@ -23,12 +22,20 @@ from ....kinematics.continuation import track
 from ....kinematics.coordinates import Coordinates
 from ....mechanism.pose import SCALARS, Grid, Pose
 from ....results import Value
-from ....tolerances import LOCUS_SINGULAR_VALUE_FRACTION, RELATION_ANGLE_TOL, SLIDER_TARGET_TOL
+from ....tolerances import POSE_VALUE_MAX, RELATION_ANGLE_TOL, SLIDER_TARGET_TOL
 from ...text.tables import NOT_BOUNDED, check_bounded
 from ...view.scale import CONE, CONE_TEXT, SIGNS, STEPS, choose_error_unit, round_digits
 from ...view.states import Mover
 from ..commands import NONE, format_commands, format_digits, is_reproduced_by_pose
 from ..request import Request
+
+LOCUS_SINGULAR_VALUE_FRACTION = 0.2
+"""Fraction of the median of the smallest singular value of Mᵀ in a plane, below which a sign change of a determinant is
+a zero."""
+STUDIO_PLANE_SIDE_MAX = 101
+"""Poses per side of a plane of the studio."""
+STUDIO_SWEEP_SIDE_MAX = 16
+"""Poses per side of a plane that is solved pose by pose."""
 
 ACCURACY, DISTANCE = "accuracy", "distance"
 DISTANCES = (0.01, 0.03, 0.1, 0.3)

@@ -8,12 +8,11 @@ import numpy as np
 
 from ....analysis.configuration_report import ConfigurationAnalysis
 from ....analysis.modes.self_motions import follow_motion
-from ....budgets import STUDIO_LIST_NAMES_MAX
 from ....errors import BadRequest
 from ....kinematics.tasks import FixedValuesTask, stack_task
 from ....kinematics.velocity_relation import ObservationModel
 from ...view.states import RealAndHiddenState
-from ..request import Request
+from ..request import STUDIO_LIST_NAMES_MAX, Request
 from .move import describe_state
 
 PLAY_CONFIGURATIONS_COUNT = 12

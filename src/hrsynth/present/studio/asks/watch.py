@@ -14,15 +14,14 @@ from ....analysis.accuracy.pose_errors import compute_error_axes
 from ....analysis.configuration_report import ConfigurationAnalysis
 from ....analysis.freedoms import Freedom
 from ....analysis.measured import MeasuredRobot
-from ....analysis.observed import ObservedRobot, restrict_samples
+from ....analysis.observed import ObservedRobot
 from ....analysis.verdict import CONTROLLABLE, Verdict, compute_verdict
-from ....budgets import CACHED_OBSERVED_ROBOTS_COUNT
 from ....constraints.condition import describe_permanent_loss
 from ....errors import HrsynthError, UndecidedRank
 from ....kinematics.configuration import ClosedConfiguration
 from ....mechanism.observation import list_labels
 from ....mechanism.observations.direction import Direction
-from ....tolerances import NAMED_TWIST_TOL
+from ....tolerances import CACHED_OBSERVED_ROBOTS_COUNT, NAMED_TWIST_TOL
 from ...text.poses import STATES
 from ...text.robots import describe_exact, describe_zero, format_certificate
 from ...view.scale import CONE, choose_error_unit, describe_no_error, describe_pose_error
@@ -121,7 +120,7 @@ def describe_hidden_robot(request: Request) -> str:
 
 def describe_condition(setup: ObservedRobot) -> str:
     """Describe the Type 2 condition."""
-    robot = MeasuredRobot.of_directions(setup)
+    robot = MeasuredRobot.of(setup)
     try:
         if robot.verdict.unobserved:
             return describe_permanent_loss(robot.pattern, robot.verdict.never)
@@ -143,9 +142,7 @@ def find_smallest_sets(setup: ObservedRobot) -> tuple[Verdict, ...]:
     for size in range(1, len(labels) + 1):
         found = []
         for chosen in combinations(labels, size):
-            samples = restrict_samples(
-                setup.all_samples, [each for each in setup.observed if each.leg in chosen], ways=False
-            )
+            samples = setup.all_samples.restrict([each for each in setup.observed if each.leg in chosen], ways=False)
             if max(member.relation.rank for member in samples.members) == best:
                 with suppress(UndecidedRank):
                     found.append(compute_verdict(setup, chosen, samples))
