@@ -12,7 +12,7 @@ import warnings
 from ..errors import AssumedBase, AssumedPlatform
 from . import completion, files, importing, lint, schema, studio
 from .analyses import QUESTIONS
-from .app import app as app
+from .app import app
 from .catalog import catalog
 from .colour import close, print_text
 

@@ -13,7 +13,7 @@ from ..present.outputs import File, get_outputs
 from ..progress import on_progress
 from .colour import paint, print_text
 from .commands import Group, add_command
-from .options import JSON, SOURCE, load_robot, split_names, warn, warn_radians, warn_turns
+from .options import EXPLAIN, JSON, SOURCE, load_robot, split_names, warn, warn_radians, warn_turns
 from .progress import Progress
 from .studio import PORT, serve
 
@@ -38,7 +38,7 @@ class Question:
         own += [_make_file_option(each) for each in files if each.option is not None]
         drawn = FIGURE if any(each.drawn for each in files) else ()
         seed = [each for each in given if each.name == "seed" and declared["seeded"]]
-        every = [SOURCE[0], *own, *self.more, *seed, *drawn, JSON, *SOURCE[1:]]
+        every = [SOURCE[0], *own, *self.more, *seed, *drawn, JSON, *SOURCE[1:], EXPLAIN]
         add_command(app, self.name, declared["help"], every, self.answer, declared["examples"])
 
     def answer(self, *, json: bool, **values: Any) -> None:

@@ -9,7 +9,7 @@ from ..records import Head, OfRobot, Platform
 from . import options
 from .colour import print_text
 from .commands import Group, add_command
-from .options import JSON, SOURCE, load_robot, warn
+from .options import EXPLAIN, JSON, SOURCE, load_robot, warn
 from .progress import Progress
 
 
@@ -45,9 +45,25 @@ class Verify(Head):
 
     robot: NotRequired[str]
     platform: NotRequired[Platform]
+    notes: NotRequired[list[str]]
     file: str
     accepted: bool
     proved: str
+
+
+def list_format_names() -> list[str]:
+    """Return the names of the formats that are written."""
+    from ..description.formats import list_writable_formats
+
+    return [each.name for each in list_writable_formats()]
+
+
+def _describe_formats() -> str:
+    """Return the formats that are written, with the extensions of their files."""
+    from ..description.formats import list_writable_formats
+
+    words = [f"{each.name} ({' '.join(each.endings)})" for each in list_writable_formats()]
+    return f"Format, whatever the extension: {', '.join(words)}."
 
 
 def print_robots(examples: bool, json: bool) -> None:
@@ -177,8 +193,7 @@ def add(app: Group) -> None:
     add_command(
         app,
         "convert",
-        "Read a robot in any format and write it in another: .urdf native, .yaml Gepetto, "
-        ".xml MJCF, .sdf SDFormat, .usda, .usd or .usdc USD.",
+        "Read a robot in any format and write it in another.",
         (
             *SOURCE,
             Option("target", "The file to write; its extension selects the format.", "[OUT]", argument=True),
@@ -192,11 +207,12 @@ def add(app: Group) -> None:
             ),
             Option(
                 "to",
-                "native, gepetto, mjcf, sdf or usd, whatever the extension.",
+                _describe_formats,
                 "FORMAT",
-                words=("native", "gepetto", "mjcf", "sdf", "usd"),
+                words=list_format_names,
             ),
             JSON,
+            EXPLAIN,
         ),
         convert,
         ("quattro quattro.xml", "leg.urdf -o robot.usda --meshes copy", "leg.urdf robot.yaml --to gepetto"),

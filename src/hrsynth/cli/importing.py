@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 import sys
 from collections.abc import Callable, Iterable, Sequence
@@ -13,7 +14,7 @@ from ..options import NEEDED, OBSERVATION, Option, flag, output
 from ..records import OfRobot
 from .colour import print_text
 from .commands import Group, add_command
-from .options import JSON, SOURCE, load_robot, load_robot_silently, warn
+from .options import EXPLAIN, JSON, SOURCE, load_robot, load_robot_silently, warn
 from .progress import Progress
 
 if TYPE_CHECKING:
@@ -37,7 +38,6 @@ class Import(OfRobot):
     base: str
     motors: list[str]
     observed: dict[str, str]
-    notes: list[str]
     warnings: list[str]
 
 
@@ -100,10 +100,10 @@ def repeat_command(source: dict[str, Any], observe: str | None, target: str) -> 
 
 
 def _read(source: dict[str, Any], observe: str | None, *, tell: bool) -> Mechanism:
-    """Read the mechanism with the overrides; ``tell``: print its notes."""
+    """Read the mechanism with the overrides; ``tell``: print all its notes."""
     from ..description.overrides import observe_links, parse_names
 
-    mechanism = (load_robot if tell else load_robot_silently)(dict(source))
+    mechanism = load_robot({**source, EXPLAIN.name: True}) if tell else load_robot_silently(dict(source))
     mechanism.require_platform()
     return mechanism if observe is None else observe_links(mechanism, parse_names(observe) or ())
 
@@ -188,6 +188,8 @@ class _Dialog:
                     tuple(given["close"] or ()),
                     tuple(name for name in given["freeze"].split(",") if name),
                     unit=given["unit"],
+                    args=tuple(given["args"] or ()),
+                    model=given["model"],
                 ),
             )
 
@@ -228,7 +230,7 @@ class _Dialog:
 
         def chosen(text: str) -> list[str]:
             wishes = []
-            for word in _split_words(text) if "@" not in text else parse_closures(text):
+            for word in parse_closures(",".join(re.split(r"[,\s]+", text.strip(", ")))):
                 number, _, kind = word.partition(":")
                 if number.isdecimal():
                     wishes.append(near[_parse_number(number, len(near)) - 1].wish + (f":{kind}" if kind else ""))
@@ -239,7 +241,7 @@ class _Dialog:
             return wishes
 
         self.source["close"] = _answer(
-            "Close which? Numbers, 2:revolute for a revolute joint about z, A:B[:TYPE] or A@x,y,z:B for others",
+            "Close which? Numbers, 2:revolute/0,0,1 for a revolute joint about z, A:B[:TYPE] or A@x,y,z:B for others",
             "none",
             lambda text: [] if text == "none" else chosen(text),
         )
@@ -449,6 +451,6 @@ def add(app: Group) -> None:
             JSON,
         ),
         run_import,
-        ("leg.xml -o leg.urdf", "leg.urdf --close heel:toe:revolute --platform sole --yes -o own.urdf"),
+        ("leg.xml -o leg.urdf", "leg.urdf --close heel:toe:revolute/0,0,1 --platform sole --yes -o own.urdf"),
         Import,
     )

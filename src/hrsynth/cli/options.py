@@ -36,9 +36,9 @@ SOURCE = (
     Option("motors", "The actuated joints, if the file names none.", "JOINTS", group=OVERRIDES),
     Option(
         "close",
-        "A loop closure: frames of two links, or points A@x,y,z in them, that coincide (default: spherical joint); "
-        "repeat for more.",
-        "A:B[:TYPE]",
+        "A loop closure: frames of two links, or points A@x,y,z in them (metres), that coincide (default: spherical "
+        "joint, in a planar loop revolute; revolute/0,0,1: an axis in A's frame); repeat for more.",
+        "A:B[:TYPE[/AXIS]]",
         kind=list[str],
         group=OVERRIDES,
     ),
@@ -64,6 +64,15 @@ SOURCE = (
         float,
         group=OVERRIDES,
     ),
+    Option("model", "The model to read, if an SDFormat file has several.", "NAME", group=OVERRIDES),
+    Option(
+        "args",
+        "An argument of a xacro file; repeat for more.",
+        "NAME:=VALUE",
+        list[str],
+        flags=("--arg",),
+        group=OVERRIDES,
+    ),
     flag(
         "as_written",
         "Use the file's numbers unchanged: do not repair rounded geometry.",
@@ -73,11 +82,22 @@ SOURCE = (
 """Robot file and its overrides."""
 
 
+EXPLAIN = flag("explain", "List all elements and relations of the file that are read as equivalents.", OVERRIDES)
+
+
 def load_robot(values: dict[str, Any]) -> Mechanism:
     """Load the mechanism of the options of ``SOURCE``, removed from ``values``; print assumptions to standard error."""
+    explain = values.pop(EXPLAIN.name, False)
     mechanism = load_robot_silently(values)
+    merged = [note for note in mechanism.notes if note.kind == "merged"]
     for note in mechanism.notes:
-        warn(str(note))
+        if explain or len(merged) < 2 or note.kind != "merged":
+            warn(str(note))
+        elif note is merged[0]:
+            change = max(note.change for note in merged)
+            size = f"the largest change is {change:.1e} (characteristic lengths, rad)" if change else "nothing moves"
+            count = sum(note.count for note in merged)
+            warn(f"merged: {count} elements or relations are read as equivalents, {size}; --explain lists them")
     return mechanism
 
 

@@ -36,15 +36,15 @@ def build_schema(command: str) -> dict[str, Any]:
         kind, files = answer_type(getattr(hrsynth, command)), get_outputs(command).files
         of_robot = "robot" in signature(getattr(hrsynth, command)).parameters
         heads = [
-            build_object_schema([OfRobot if of_robot else Head, each], parts) for each in get_args(kind) or (kind,)
+            build_object_schema([OfRobot if of_robot else Head, item], parts) for item in get_args(kind) or (kind,)
         ]
     fields = {file.field: str | None for file in files if file.option is not None and file.field is not None}
     fields |= {
         file.record: answer_type(load_function(file.computed)) | None for file in files if file.record and file.computed
     }
-    for each in heads:
-        each["properties"] |= {name: records.build_type_schema(kind, parts) for name, kind in fields.items()}
-        each["required"] = sorted([*each["required"], *fields])
+    for item in heads:
+        item["properties"] |= {name: records.build_type_schema(kind, parts) for name, kind in fields.items()}
+        item["required"] = sorted([*item["required"], *fields])
     told = {"title": f"hrsynth {command} --json", "description": read_summary((get_args(kind) or (kind,))[0])}
     return {"$schema": DIALECT, **told, **(heads[0] if len(heads) == 1 else {"anyOf": heads}), "$defs": parts}
 
@@ -52,8 +52,8 @@ def build_schema(command: str) -> dict[str, Any]:
 def list_json_commands() -> dict[str, DeclaredCommand]:
     """Return the commands that print JSON, by name."""
     every: list[Any] = [*app.commands.values()]
-    leaves = [each for group in every for each in getattr(group, "commands", {"": group}).values()]
-    return {each.name: each for each in leaves if any(option.name == "json" for option in each.options)}
+    leaves = [item for group in every for item in getattr(group, "commands", {"": group}).values()]
+    return {item.name: item for item in leaves if any(option.name == "json" for option in item.options)}
 
 
 def format_schema_page() -> str:
@@ -95,7 +95,7 @@ def add(app: Group) -> None:
                 list[str],
                 NEEDED,
                 argument=True,
-                words=lambda: [each for each in list_json_commands() if " " not in each],
+                words=lambda: [item for item in list_json_commands() if " " not in item],
             ),
         ),
         told,
