@@ -3,7 +3,6 @@
 from . import catalog as catalog
 from .analysis.accuracy.accuracy import accuracy as accuracy
 from .analysis.advice import advise as advise
-from .analysis.analysis_declaration import clear_cache as clear_cache
 from .analysis.aspects.aspects import aspects as aspects
 from .analysis.aspects.path import path as path
 from .analysis.branch.proof import branch as branch
@@ -13,6 +12,7 @@ from .analysis.derive import derive as derive
 from .analysis.modes.modes import modes as modes
 from .analysis.parallel_map import map_robots as map_robots
 from .analysis.pose_requests import observe as observe
+from .analysis.result_cache import clear_cache as clear_cache
 from .analysis.singularity.singularities import singularities as singularities
 from .certificates import certificate as certificate
 from .certificates import verify as verify
@@ -21,8 +21,11 @@ from .description import list_examples as list_examples
 from .description import list_robots as list_robots
 from .description import load as load
 from .description import save as save
+from .description import to_mujoco as to_mujoco
+from .description import to_urdf as to_urdf
 from .kinematics.pinocchio_export import to_pinocchio as to_pinocchio
 from .linting.lint import lint as lint
+from .mechanism.builder import build as build
 from .present.show import draw as draw
 from .present.show import html as html
 from .present.show import text as text
@@ -42,6 +45,7 @@ __all__ = [
     "aspects",
     "basins",
     "branch",
+    "build",
     "catalog",
     "certificate",
     "check",
@@ -67,7 +71,9 @@ __all__ = [
     "singularities",
     "studio",
     "text",
+    "to_mujoco",
     "to_pinocchio",
+    "to_urdf",
     "verify",
     "view",
 ]

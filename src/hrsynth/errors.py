@@ -164,12 +164,15 @@ class NoResult(HrsynthError):
 
 
 class LoopClosureFailure(NoResult):
-    """Open kinematic loops: the remaining closure residual and the loop with the largest one."""
+    """Open kinematic loops: the remaining closure residual, the loop with the largest one, and where it is open."""
 
-    def __init__(self, robot: str, residual: float, tolerance: float, loop: str, cure: str = "") -> None:
+    def __init__(
+        self, robot: str, residual: float, tolerance: float, loop: str, cure: str = "", where: str = ""
+    ) -> None:
         self.robot, self.residual, self.tolerance, self.loop = robot, residual, tolerance, loop
         super().__init__(
-            f"{robot}: loop {loop!r} is open at the zero configuration: closure residual {residual:.3g} "
+            f"{robot}: loop {loop!r} is open{' by ' * bool(where)}{where} at the zero configuration: "
+            f"closure residual {residual:.3g} "
             f"(characteristic lengths, rad), tolerance {tolerance:.3g}",
             cure or "Correct the loop's joint origins, or give them more decimals.",
         )
@@ -191,21 +194,22 @@ class MotorsNotEnough(NoResult):
 class UndecidedRank(NoResult):
     """Rank with a gap too small for a verdict."""
 
-    def __init__(self, what: str, gap: float, needed: float) -> None:
+    def __init__(self, what: str, gap: float, needed: float, remedy: str = "Give more decimals.") -> None:
         self.what, self.gap, self.needed = what, gap, needed
-        super().__init__(f"{what}: rank undecided: gap {gap:.3g}, needed {needed:.3g}", "Give more decimals.")
+        super().__init__(f"{what}: rank undecided: gap {gap:.3g}, needed {needed:.3g}", remedy)
 
 
 class RoundingLimitedRank(UndecidedRank):
-    """Loop constraints as weak as the closure residual: with exact numbers the loops may move that way."""
+    """Loop constraints as weak as the closure residual: with exact numbers the loops may move that way. With a wider
+    ``tolerance``, if there is one, they are near geometry that does."""
 
-    def __init__(self, robot: str, directions: int, open_by: float) -> None:
-        self.robot, self.directions, self.open_by = robot, directions, open_by
+    def __init__(self, robot: str, directions: int, open_by: float, tolerance: float | None = None) -> None:
+        self.robot, self.directions, self.open_by, self.tolerance = robot, directions, open_by, tolerance
         NoResult.__init__(
             self,
             f"{robot}: mobility undecided: closure residual {open_by:.1g} from rounded numbers is as large as "
             f"{directions} singular value{'s' * (directions != 1)} of the loop Jacobian",
-            "Give the numbers more decimals.",
+            f"Give the numbers more decimals{f', or --tolerance {tolerance:g}' if tolerance else ''}.",
         )
 
 
@@ -426,9 +430,9 @@ class MissingExtra(NoResult):
 class ExternalSolverFailure(NoResult):
     """Solver without a result, and the reason."""
 
-    def __init__(self, solver: str, reason: str) -> None:
+    def __init__(self, solver: str, reason: str, remedy: str = "Observe other legs.") -> None:
         self.solver, self.reason = solver, reason
-        super().__init__(f"{solver}: system not solved: {reason}", "Observe other legs, or raise --time-limit.")
+        super().__init__(f"{solver}: system not solved: {reason}", remedy)
 
 
 class TooLarge(NoResult):
@@ -445,7 +449,10 @@ class RenderFailure(NoResult):
 
     def __init__(self, reason: str) -> None:
         self.reason = reason
-        super().__init__(f"images cannot be rendered here: {reason}", "Set MUJOCO_GL to egl, osmesa or glfw.")
+        super().__init__(
+            f"images cannot be rendered here: {reason}",
+            "Set MUJOCO_GL to egl, osmesa or glfw before mujoco is imported.",
+        )
 
 
 class NeedsPosix(NoResult):

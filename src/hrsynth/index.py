@@ -19,13 +19,14 @@ INDEX, STUB = PACKAGE / "index.json", PACKAGE / "__init__.pyi"
 MARK = "\n@analysis(\n"
 KINDS: dict[str, Any] = {"str": str, "int": int, "float": float, "bool": bool, "several": list[str]}
 HELPERS = {
-    "analysis.analysis_declaration": ("clear_cache",),
+    "analysis.result_cache": ("clear_cache",),
     "analysis.parallel_map": ("map_robots",),
     "analysis.pose_requests": ("observe",),
     "certificates": ("certificate", "verify"),
-    "description": ("list_examples", "list_robots", "load", "save"),
+    "description": ("list_examples", "list_robots", "load", "save", "to_mujoco", "to_urdf"),
     "kinematics.pinocchio_export": ("to_pinocchio",),
     "linting.lint": ("lint",),
+    "mechanism.builder": ("build",),
     "present.show": ("draw", "html", "text"),
     "present.studio.server": ("studio",),
     "progress": ("on_progress",),

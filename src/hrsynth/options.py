@@ -28,7 +28,7 @@ class Option:
     ``name``; ``words``: its possible values, if known."""
 
     name: str
-    help: str
+    help: str | Callable[[], str]
     metavar: str | None = None
     kind: Any = str
     default: Any = None
@@ -62,7 +62,8 @@ class Option:
         facts = [f"default: {self.default}"] if given else ["required"] if self.default is NEEDED else []
         facts += [] if self.low is None else [f"at least {self.low}"]
         facts += [] if self.high is None else [f"at most {self.high}"]
-        return f"{self.help}  [{'; '.join(facts)}]" if facts else self.help
+        help = self.help() if callable(self.help) else self.help
+        return f"{help}  [{'; '.join(facts)}]" if facts else help
 
     @property
     def is_repeatable(self) -> bool:

@@ -140,10 +140,11 @@ class Platform(TypedDict):
 
 
 class OfRobot(Head):
-    """First fields of a result on a robot."""
+    """First fields of a result on a robot, with the notes of reading its file, if any."""
 
     robot: str
     platform: Platform
+    notes: NotRequired[list[str]]
 
 
 def _collect_members(value: Any, scale: float | None = None) -> dict[str, Any]:

@@ -28,8 +28,8 @@ def drop_infinite(value: float | None) -> float | None:
 
 
 class Value(Record):
-    """Base of frozen dataclasses (with ``repr=False``): one line at a prompt, pickled and copied by fields. Cached
-    properties are computed again in a copy, and arrays stay read-only."""
+    """Base class of frozen dataclasses declared with ``repr=False``: its repr is one line. Pickles and copies hold the
+    fields only: a copy computes cached properties again, and its arrays are read-only."""
 
     def __repr__(self) -> str:
         own = [field for field in fields(self) if field.repr]  # type: ignore[arg-type]
@@ -136,7 +136,7 @@ class Result(ComparableValue):
 
     def said(self) -> tuple[Any, ...]:
         """Return the content that is compared: the setup and the JSON."""
-        return getattr(self, "setting", None), self.to_dict()
+        return getattr(self, "setup", None), self.to_dict()
 
     def __hash__(self) -> int:
         return hash(self.headline() if self.word is None else self.word)

@@ -13,8 +13,14 @@ import zipfile
 import zlib
 from pathlib import Path
 
-from .budgets import ARCHIVE_FILES_MAX, PROCESS_BYTES, UNPACKED_MAX_BYTES
 from .errors import BadRequest
+
+UNPACKED_MAX_BYTES = 200_000_000
+"""Largest unpacked size of a file, an archive or a robot's meshes (bytes)."""
+ARCHIVE_FILES_MAX = 1000
+"""Files that an archive may hold."""
+PROCESS_BYTES = 1_700_000_000
+"""Address space of a process that reads an untrusted file (bytes)."""
 
 START = "import sys, json; sys.path[:] = json.loads(sys.argv[1]); from {} import start; start(*sys.argv[2:])"
 REFUSED = "refused: "
