@@ -3,6 +3,7 @@ test: what one patches is seen."""
 
 import gc
 import os
+import sys
 from collections import Counter
 from collections.abc import Iterator
 from functools import lru_cache
@@ -16,6 +17,8 @@ pytest_plugins = ["browser"]
 gc.set_threshold(50_000, 20, 50)  # little of what tests make is a circle: to look for some takes a tenth of the time
 for library in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(library, "1")
+if sys.platform == "linux":
+    os.environ.setdefault("MUJOCO_GL", "egl")  # read when mujoco is imported, whatever file of tests does so first
 
 # no law is about time: on a busy machine an example may take long, or be long in the making
 settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -32,7 +35,7 @@ def robots_observed_once() -> None:
 
 @pytest.fixture(autouse=True)
 def nothing_answered_before():
-    from hrsynth.analysis.analysis_declaration import clear_results
+    from hrsynth.analysis.result_cache import clear_results
 
     clear_results()
 

@@ -353,10 +353,11 @@ def renamed(mechanism: Mechanism, rng: Rng) -> Mechanism:
     numbers = iter(rng.permutation(10 * (len(mechanism.links) + len(mechanism.joints))))
     new = {name: f"n{next(numbers)}" for name in mechanism.links}
     links = [replace(link, name=new[link.name]) for link in mechanism.links.values()]
+    joint_names = {name: f"n{next(numbers)}" for name in mechanism.joints}
     joints = [
         replace(
             joint,
-            name=f"n{next(numbers)}",
+            name=joint_names[joint.name],
             predecessor=new[joint.predecessor],
             successor=new[joint.successor],
             motor=joint.motor and replace(joint.motor, name=f"drive_{joint.motor.name[::-1]}"),
@@ -372,7 +373,7 @@ def renamed(mechanism: Mechanism, rng: Rng) -> Mechanism:
         camera=None if mechanism.camera is None else new[mechanism.camera],
         observations=tuple(replace(each, link=new[each.link]) for each in mechanism.observations),
         couplings=tuple(
-            replace(gear, predecessor=new[gear.predecessor], successor=new[gear.successor])
+            replace(gear, driver=joint_names[gear.driver], driven=joint_names[gear.driven])
             for gear in mechanism.couplings
         ),
     )
@@ -398,11 +399,11 @@ def reordered(mechanism: Mechanism, rng: Rng, legs: bool = True) -> Mechanism:
 def recut(mechanism: Mechanism, rng: Rng) -> Mechanism:
     """Another spanning tree: other joints are written as loops; tree joints are turned to point away from the base.
 
-    Free joints, which no loop can be, stay in the tree. Mechanisms with gears, which name joints by the links that they
-    carry, have no other cut.
+    Free joints, which no loop can be, stay in the tree. Mechanisms with gears, whose joints must be in it, have no
+    other cut.
     """
     if mechanism.couplings:
-        raise ValueError("a gear names joints by the links that they carry")
+        raise ValueError("the joints of a gear are in the tree")
     names = list(mechanism.joints)
     drawn = [names[k] for k in rng.permutation(len(names))]
     drawn.sort(key=lambda name: mechanism.joints[name].type is not JointType.FREE)

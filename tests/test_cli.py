@@ -528,12 +528,26 @@ def test_check_json_is_the_contract(run):
     ]
 
 
+@pytest.mark.parametrize(
+    ("robot", "motion"),
+    [
+        ("3rrr_m1", "3 dof, 1 of which rotates it"),
+        ("delta", "3 dof, none of which rotates it"),
+        ("3rps", "3 dof, 2 of which rotate it"),
+        ("quattro", "4 dof, 1 of which rotates it"),
+        ("gough_stewart", "6 dof, 3 of which rotate it"),
+    ],
+)
+def test_check_text_names_the_kind_of_motion(run, robot: str, motion: str):
+    assert f"; the platform has {motion}\n" in run("check", robot).out
+
+
 def test_check_text_names_the_singularity(run):
     answer = run("check", "rrrrr_m1", "--at", f"x=0,y={0.16 + 0.03**0.5!r}")
     assert (answer.status, answer.err) == (0, "")
     for line in (
         r"^pose +x=0,y=0.333205,",
-        r"^mobility +2, of which 0 internal; the platform has 2 dof$",
+        r"^mobility +2, of which 0 internal; the platform has 2 dof, 1 of which rotates it$",
         r"^hidden robot +the directions show 1 of 2: Type 2 singularity ",
         r"RI 0  RO 1  II 1  IO 0",
         r"^unobserved +translation along x\b",

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
 
+import hrsynth
 from description.foreign.examples import FILES
 from description.foreign.test_dialects import written
 from description.foreign.test_traps import bars, origin
 from hrsynth.cli import run_command
+from hrsynth.description import native
 
 COMMANDS = ("derive", "legs", "check", "singularities", "advise", "modes", "path", "convert")
 
@@ -39,6 +42,18 @@ def test_check_tells_what_was_guessed_and_json_stays_clean(call, tmp_path: Path)
     status, out, remarks = call("check", path, "--platform", "bar", "--motors", "a", "--observe", "crank", "--json")
     assert (status, remarks) == (0, [])
     assert json.loads(out)["configurations"][0]["real"] is not None
+
+
+@pytest.mark.parametrize("command", ["check", "legs", "derive"])
+def test_json_has_the_notes_that_are_printed(call, command: str, tmp_path: Path):
+    """What was ignored or assumed is in the record of a robot, not on standard error alone; none is no member."""
+    texts = {name: text.replace("</model>", '<link name="spare"/></model>') for name, text in FILES["sdf: 1.7"].items()}
+    path = written(tmp_path, texts)
+    _, out, remarks = call(command, path, "--json")
+    notes = json.loads(out)["notes"]
+    assert any(note.startswith("ignored: ") and "spare" in note for note in notes)
+    assert notes == [line.removeprefix("hrsynth: ") for line in remarks[: len(notes)]]
+    assert "notes" not in json.loads(call(command, "3rps", "--json")[1])
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -88,3 +103,21 @@ def test_convert_goes_between_all_dialects(call, tmp_path: Path):
     status, _, lines = call("convert", source, tmp_path / "e.xml", "--to", "step")
     assert (status, len([line for line in lines if "unknown format" in line])) == (2, 1)
     assert not (tmp_path / "e.xml").exists()
+
+
+def test_changes_of_a_rounded_file_are_one_line_and_listed_on_request(call, tmp_path: Path):
+    """The line has the count and the largest change of the notes that Python and ``lint`` have."""
+    text = native.write(hrsynth.load("quattro"))
+    rounded = re.sub(r"-?\d\.\d{6,}(e-\d+)?", lambda number: f"{float(number[0]):.5f}", text)
+    path = written(tmp_path, {"robot.urdf": rounded})
+    merged = [note for note in hrsynth.load(path).notes if note.kind == "merged"]
+    assert len(merged) > 1
+    (line,) = [each for each in call("check", path)[2] if "merged" in each]
+    (relations,) = re.findall(r"(\d+) relations of joints", merged[0].text)
+    (change,) = re.findall(r"largest change (\S+);", merged[0].text)
+    assert f"merged: {relations} elements or relations" in line
+    assert f"the largest change is {change} " in line
+    every = [each for each in call("check", path, "--explain")[2] if "merged" in each]
+    assert every == [f"hrsynth: {note}" for note in merged]
+    linted = call("lint", path)[1]
+    assert all(note.text in linted for note in merged)

@@ -53,7 +53,11 @@ QUICK = {
         "3rrr_m1 --cone 0.1deg --grid x=0:0.02:2,y=0:0.02:2 -o sweep.npy",
     ],
     "select": ["rrrrr_m1 --start x=0.05 --goal x=-0.01,y=0.03 --runs 1 --visible-from auto"],
-    "export": ["prrrp_m1 --box guide_1=-0.001:0.001,guide_2=-0.001:0.001 -o code.hpp"],
+    "export": [
+        "prrrp_m1 -o tracker.hpp",
+        "prrrp_m1 --jumps --box guide_1=-0.001:0.001,guide_2=-0.001:0.001 -o code.hpp",
+        "prrrp_m1 --lang python --box guide_1=-0.001:0.001,guide_2=-0.001:0.001 -o code.py",
+    ],
     "view": ["rrrrr_m1 --static view.html"],
     "verify": ["c.json"],
     "lint": ["quattro --program mujoco --fail-on nothing", "delta --compare 3rrr_m1 --fail-on nothing"],

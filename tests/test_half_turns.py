@@ -30,6 +30,9 @@ from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.continuation import track
 from hrsynth.kinematics.tasks import PoseAndValuesTask
 from hrsynth.mechanism import Mechanism
+from hrsynth.mechanism.builder import Builder
+from hrsynth.mechanism.legs import Leg
+from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.mechanism.observations.encoder import AngleEncoder
 from hrsynth.mechanism.pose import Grid, Pose
 from hrsynth.selection import select as selections
@@ -258,20 +261,23 @@ def test_a_motor_at_half_a_turn_is_held_from_either_side() -> None:
 
 
 def test_a_link_that_has_turned_over_does_not_close_its_leg() -> None:
-    """Half a turn about the line through its two joints keeps the joints' centres and leaves their axes parallel."""
-    setup = case_of("3rrr_m1").setting
-    leg, seen = setup.decomposition.legs[0], setup.segments[0]
-    chain = IterativeLeg.of(setup.mechanism, leg, seen, None)
-    place = chain.links.index(seen.link)
-    one, two = (joint.point / chain.length for joint in setup.mechanism.joints_of(seen.link))
-    state = chain.start(1)
-    ends = state[:, 1].copy()
-    assert chain.close(state, ends, 1)[1] == pytest.approx([0], abs=1e-12)
-    turn = half_turn((two - one) / np.linalg.norm(two - one))
-    state[0, place, :3, 3] = one + turn @ (state[0, place, :3, 3] - one)
-    state[0, place, :3, :3] = turn @ state[0, place, :3, :3]
-    assert np.linalg.norm(chain.ties.residual(state)) < 1e-12
-    assert chain.close(state, ends, 1)[1] == [np.inf]
+    """A rod that a C and a planar joint hold on the crank: half a turn of the C leaves the plane where it is, but for
+    its sense."""
+    b = Builder("turned")
+    for name in ("base", "crank", "rod", "plate"):
+        b.link(name)
+    b.joint("foot", "R", "base", "crank", (0, 0, 0), axis=(0, 0, 1), motor=True)
+    b.joint("guide", "C", "crank", "rod", (1, 0, 0), axis=(1, 0, 0))
+    b.joint("table", "E", "crank", "rod", (2, 0, 0), axis=(0, 0, 1))
+    b.joint("ball", "S", "rod", "plate", (3, 0, 0))
+    mechanism = b.build("plate")
+    leg = Leg("1", ("crank", "rod"), ("foot", "guide", "table", "ball"), "plate")
+    chain = IterativeLeg.of(mechanism, leg, Direction("1", "rod", np.array([1.0, 0.0, 0.0])), None)
+    q, ends = chain.start(1), np.eye(4)[None]
+    assert chain.close(q, ends, 1)[1] == pytest.approx([0], abs=1e-12)
+    q[0, chain.system.names.index("guide.2")] = np.pi
+    ends[0, :3, :3] = chain.frames(["plate"], q)["plate"][0, :3, :3]
+    assert chain.close(q, ends, 1)[1] == [np.inf]
 
 
 @pytest.fixture(autouse=True)

@@ -17,15 +17,15 @@ from hrsynth.processes import run_shared
 
 COMMANDS = {
     "basins": ["basins", "rrrrr_m1", "--goal", "x=0.02,y=0.24", "--grid", "x=-0.2:0.2:45,y=0.1:0.3:45", "--jobs", "2"],
-    "equilibria": ["equilibria", "rrrrr_m1", "--at", "x=0.02", "--jobs", "2"],
+    "equilibria": ["equilibria", "3rrr_m1", "--complete", "--jobs", "2"],
     "build": ["catalog", "build", "planar", "-o", "built", "--workers", "2"],
     "site": ["catalog", "site", "--group", "planar", "-o", "site", "--workers", "2"],
 }
 CLI = """
 import sys
-import hrsynth.simulation.equilibria.subdivision as boxes
+import hrsynth.solving.exhaust as boxes
 from hrsynth.cli import run_command
-boxes.BOXES_ALONE, boxes.BOXES_A_PART = 1, 1000
+boxes.SERIAL_BOXES_COUNT, boxes.BOXES_A_PART = 1, 1000
 sys.exit(run_command(sys.argv[1:]))
 """
 MAP = "import hrsynth; hrsynth.map_robots('check', ['quattro'], poses=['z=-0.7'] * 20_000, jobs=2)"

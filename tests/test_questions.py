@@ -1,11 +1,10 @@
-"""How questions are asked in Python: robots, legs and poses in every form, errors that name what is allowed, old names,
-answers that are remembered."""
+"""How questions are asked in Python: robots, legs and poses in every form, errors that name what is allowed,
+results that are cached."""
 
 from __future__ import annotations
 
 import inspect
 import pydoc
-import warnings
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -209,18 +208,13 @@ def test_every_function_refuses_what_is_no_robot(name):
         assert len(caught.value.lines()) == 1
 
 
-def test_names_that_were_are_taken_with_a_warning():
+def test_other_names_are_refused_with_the_nearest():
     accuracy: Any = hrsynth.accuracy
-    with pytest.warns(DeprecationWarning, match="cones is now called cone"):
-        old = accuracy("3rrr_m1", cones="0.1deg")
-    with pytest.warns(DeprecationWarning, match="samples is now called nonlinear"):
-        accuracy("3rrr_m1", cone="0.1deg", samples=4)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        assert accuracy("3rrr_m1", cone="0.1deg") == old
-        assert accuracy("3rrr_m1", cone={1: "0.1deg", "2": np.radians(0.1), 3: "0.1deg"}) == old
-    with pytest.raises(TypeError):
-        accuracy("3rrr_m1", cone="0.1deg", cones="0.1deg")
+    known = accuracy("3rrr_m1", cone="0.1deg")
+    assert accuracy("3rrr_m1", cone={1: "0.1deg", "2": np.radians(0.1), 3: "0.1deg"}) == known
+    for function, ends in ((accuracy, {}), (hrsynth.select, {"start": "x=0", "goal": "x=0.01"})):
+        with pytest.raises(TypeError, match=f"{function.__name__} has no 'cones', did you mean 'cone'"):
+            function("3rrr_m1", cones="0.1deg", **ends)
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
@@ -288,7 +282,7 @@ class TestMemory:
 
     def test_what_went_on_without_a_package_is_asked_again(self):
         """The package may be there the next time."""
-        from hrsynth.analysis.analysis_declaration import AnswerMemory
+        from hrsynth.analysis.result_cache import ResultCache
 
         def asked(missing: bool) -> str:
             if missing:
@@ -296,17 +290,17 @@ class TestMemory:
                     raise MissingExtra("listing", "solve")
             return "without" if missing else "with"
 
-        memory = AnswerMemory(3)
-        found = [memory.answer("modes", lambda missing=missing: asked(missing)) for missing in (True, False, True)]
+        cache = ResultCache(3)
+        found = [cache.get("modes", lambda missing=missing: asked(missing)) for missing in (True, False, True)]
         assert found == ["without", "with", "with"]
 
     def test_only_so_much_is_kept(self):
-        from hrsynth.analysis.analysis_declaration import AnswerMemory
+        from hrsynth.analysis.result_cache import ResultCache
 
-        memory = AnswerMemory(3)
+        cache = ResultCache(3)
         for k in (*range(5), 3):
-            memory.answer(k, lambda k=k: object())
-        assert list(memory.kept) == [2, 4, 3]
+            cache.get(k, lambda k=k: object())
+        assert list(cache.kept) == [2, 4, 3]
 
     def test_all_legs_with_a_sensor_are_another_result_than_the_sensor_alone(self):
         for observe in ("all", None):

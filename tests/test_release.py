@@ -76,7 +76,7 @@ def test_every_extra_that_is_named_is_there_and_all_holds_them():
     assert {"plots", "solve", "bench", "usd", "xacro"} <= named
     assert named <= extras.keys()
     (whole,) = extras["all"]
-    assert set(re.search(r"\[(.*)\]", whole)[1].split(",")) == extras.keys() - {"all"}
+    assert set(re.search(r"\[(.*)\]", whole)[1].split(",")) == extras.keys() - {"all", "torch"}
     page = (ROOT / "docs" / "pages" / "install.md").read_text(encoding="utf-8")
     assert all(f"| `{extra}` |" in page for extra in extras)
 
@@ -125,26 +125,27 @@ NEEDING = [
 
 
 def test_every_extra_of_a_command_or_function_is_tried():
-    """``view`` brings what ``studio`` does, and what ``docs`` brings no command needs."""
+    """``view`` brings what ``studio`` does; what ``docs``, ``jax`` and ``torch`` bring no command needs."""
     assert {extra for _, extra, _ in NEEDING} | {*CALLS} == PROJECT["optional-dependencies"].keys() - {
         "all",
         "docs",
+        "jax",
+        "torch",
         "view",
     }
 
 
 CALLS = {
-    "fast": lambda: compiled("numba"),
-    "jax": lambda: compiled("jax"),
+    "fast": lambda: compiled_pose(),
     "solve": lambda: import_module("hrsynth.analysis.modes.msolve").executable(),
 }
 """What needs a package in Python alone, or where another way is left to the command."""
 
 
-def compiled(by: str) -> object:
-    """A pose evaluated by a package."""
+def compiled_pose() -> object:
+    """A pose evaluated by numba."""
     batch = hrsynth.observe("delta").batch
-    return batch.evaluate(batch.home[None], compiled=by)
+    return batch.evaluate(batch.home[None], compiled=True)
 
 
 @pytest.mark.parametrize("extra", CALLS)

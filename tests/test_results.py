@@ -48,7 +48,7 @@ ASKED = {
     "select": lambda: hrsynth.select(
         hrsynth.load("3rrr_m1"), start="x=0.01,y=0,phi=0", goal="x=-0.01,y=0,phi=0.05", runs=1, examine=1
     ),
-    "export": lambda: hrsynth.export("prrrp_m1", box="guide_1=-0.001:0.001,guide_2=-0.001:0.001"),
+    "export": lambda: hrsynth.export("prrrp_m1", box="guide_1=-0.001:0.001,guide_2=-0.001:0.001", jumps=True),
     "view": lambda: hrsynth.view(hrsynth.load("3rrr_m1"), hidden=True),
 }
 

@@ -51,6 +51,7 @@ HOW_TO = [
     "read",
     "repair",
     "simulate",
+    "track",
     "use",
 ]
 PARAGRAPH, SENTENCE, TASK = 90, 25, 600

@@ -139,12 +139,12 @@ def cases() -> Iterator[Case]:
             yield Case("convert", f"{name} to {dialect}", ("convert", file, "-o", "{folder}/robot" + ending))
     for name, rest in BRANCHES.items():
         yield Case("answer", f"branch of {name}", ("branch", name, *rest))
-        for language, ending in (("cpp", ".hpp"), ("numpy", ".py")):
-            yield Case(
-                "convert",
-                f"code of {name} in {language}",
-                ("export", name, *rest, "--lang", language, "-o", "{folder}/code" + ending),
-            )
+        for what, ending, argv in (
+            ("export", ".hpp", ()),
+            ("export with cells", ".hpp", (*rest, "--jumps")),
+            ("export in Python", ".py", (*rest, "--lang", "python")),
+        ):
+            yield Case("convert", f"{what} of {name}", ("export", name, *argv, "-o", "{folder}/code" + ending))
     for name, argv in PICTURES.items():
         yield Case("picture", name, (*argv, "-o", "{folder}/picture.png"))
     words = sorted(each["key"] for each in catalog() if "refused" not in each)
