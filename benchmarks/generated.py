@@ -18,11 +18,13 @@ from hrsynth.description import load
 from hrsynth.description.formats.mjcf.write import write
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
+from hrsynth.mechanism import Mechanism
 
 POSES = 2000
 """Motor coordinates of the comparison."""
 ROBOTS = {"rrrrr_m1": 0.05, "3rrr_m1": 0.02}
 """Robots, and half the width of their boxes (rad)."""
+EIGEN = Path(sysconfig.get_paths()["purelib"]) / "cmeel.prefix" / "include" / "eigen3"
 OURS = """
 #include "robot.hpp"
 #include <chrono>
@@ -105,58 +107,21 @@ int main(int, char** names) {
 
 def generated() -> Iterator[Row]:
     """Motors to the platform's pose, from the same start each time, to 1e-12."""
-    packages = Path(sysconfig.get_paths()["purelib"])
-    headers = packages / "cmeel.prefix" / "include" / "eigen3"
-    libraries = sorted((packages / "mujoco").glob("libmujoco.so*"))
-    if shutil.which("g++") is None or not headers.exists() or not libraries:
+    mujoco = find_mujoco()
+    if mujoco is None:
         return
     for name, half in ROBOTS.items():
         robot = load(name)
         motors = [joint.name for joint in robot.joints.values() if joint.is_actuated]
         box = dict.fromkeys(motors, (-half, half))
         rows = np.random.default_rng(0).uniform(-half, half, (POSES, len(motors)))
-        given = "\n".join(" ".join(map(repr, map(float, row))) for row in rows)
+        given = write_rows(rows)
         with TemporaryDirectory() as folder:
             here = Path(folder)
-            (here / "robot.hpp").write_text(export(robot, box=box).code)
-            (here / "robot.xml").write_text(write(robot).texts[0])
-            found = []
-            for text, rest, arguments in (
-                (OURS, [], []),
-                (
-                    THEIRS,
-                    [
-                        f"-isystem{packages / 'mujoco' / 'include'}",
-                        str(libraries[0]),
-                        f"-Wl,-rpath,{packages / 'mujoco'}",
-                    ],
-                    [robot.platform, *motors],
-                ),
-            ):
-                (here / "main.cpp").write_text(text)
-                subprocess.run(
-                    [
-                        "g++",
-                        "-std=c++17",
-                        "-O3",
-                        "-march=native",
-                        f"-DPOSES={POSES}",
-                        f"-DROBOT={_name(name)}",
-                        f"-DMOTORS={len(motors)}" if rest else "-DNDEBUG",
-                        f"-isystem{headers}",
-                        "main.cpp",
-                        *rest,
-                        "-o",
-                        "main",
-                    ],
-                    cwd=here,
-                    check=True,
-                )
-                done = subprocess.run(
-                    ["./main", *arguments], cwd=here, input=given, capture_output=True, text=True, check=True
-                )
-                found.append([float(x) for x in done.stdout.split()])
-        (forward, both, *p), (theirs, *other) = found
+            write_robot(here, robot, export(robot, box=box, jumps=True).code)
+            ours = build(here, OURS, [f"-DROBOT={name_space(name)}", "-DNDEBUG"], [], given)
+            found = build(here, THEIRS, [f"-DMOTORS={len(motors)}", *mujoco], [robot.platform, *motors], given)
+        (forward, both, *p), (theirs, *other) = ours, found
         if not np.allclose(p, other, atol=1e-9):
             raise SystemExit(f"{name}: platforms at {p} and {other}")
         what = f"motors to platform, {name}, one at a time"
@@ -167,14 +132,14 @@ def generated() -> Iterator[Row]:
             f"{theirs / forward:.0f}",
         )
         made = ModuleType("made")
-        exec(export(robot, "numpy", box).code, made.__dict__)
+        exec(export(robot, "python", box).code, made.__dict__)
         model = PinocchioModel(robot)
         few = rows[:200]
         batch, loop = least(
             lambda q=rows, made=made: made.forward(q),
             lambda q=few, model=model, motors=motors: [_pinocchio(model, motors, each) for each in q],
         )
-        gap = max(np.abs(made.forward(each)[3][0] - _pinocchio(model, motors, each)).max() for each in few[:20])
+        gap = max(np.abs(made.forward(each)[3] - _pinocchio(model, motors, each)).max() for each in few[:20])
         if not gap < 1e-9:
             raise SystemExit(f"{name}: platforms differ by {gap:.2g} m")
         yield (
@@ -185,7 +150,36 @@ def generated() -> Iterator[Row]:
         )
 
 
-def _name(robot: str) -> str:
+def write_rows(rows: Array) -> str:
+    """Motor coordinates as the programs read them."""
+    return "\n".join(" ".join(map(repr, map(float, row))) for row in rows)
+
+
+def write_robot(folder: Path, robot: Mechanism, code: str) -> None:
+    """Generated code, and the robot for MuJoCo."""
+    (folder / "robot.hpp").write_text(code)
+    (folder / "robot.xml").write_text(write(robot).texts[0])
+
+
+def find_mujoco() -> list[str] | None:
+    """How a compiler is told of MuJoCo; None where it, Eigen or the compiler is missing."""
+    packages = Path(sysconfig.get_paths()["purelib"])
+    libraries = sorted((packages / "mujoco").glob("libmujoco.so*"))
+    if shutil.which("g++") is None or not EIGEN.exists() or not libraries:
+        return None
+    return [f"-isystem{packages / 'mujoco' / 'include'}", str(libraries[0]), f"-Wl,-rpath,{packages / 'mujoco'}"]
+
+
+def build(folder: Path, text: str, flags: list[str], arguments: list[str], given: str = "") -> list[float]:
+    """What a program prints, compiled in a folder."""
+    (folder / "main.cpp").write_text(text)
+    first = ["g++", "-std=c++17", "-O3", "-march=native", f"-DPOSES={POSES}", f"-isystem{EIGEN}", "main.cpp"]
+    subprocess.run([*first, *flags, "-o", "main"], cwd=folder, check=True)
+    done = subprocess.run(["./main", *arguments], cwd=folder, input=given, capture_output=True, text=True, check=True)
+    return [float(x) for x in done.stdout.split()]
+
+
+def name_space(robot: str) -> str:
     return f"_{robot}" if robot[0].isdigit() else robot
 
 

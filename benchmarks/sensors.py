@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from measure import least
 
-from hrsynth.analysis.analysis_declaration import clear_cache
 from hrsynth.analysis.derive import derive
+from hrsynth.analysis.result_cache import clear_cache
 
 ROBOT = "gough_stewart"
 POINTS = [f"point:platform@{at}" for at in ("0.1,0,0", "-0.1,0.1,0", "0,0.1,0.1")]

@@ -1,9 +1,10 @@
 """The table of benchmarks: each line a ratio against another's way, measured in the same run.
 
-    python benchmarks/table.py [benchmarks/README.md]
+    python benchmarks/table.py [benchmarks/README.md [MARK ...]]
 
 Times are the least processor time of several turns, ours and theirs in turn, on one core, after imports and after numba
-has compiled. Both sides compute the same thing, which is checked. Without a file the table is printed.
+has compiled. Both sides compute the same thing, which is checked. Without a file the
+tables are printed; with MARKs only those tables are made.
 """
 
 from __future__ import annotations
@@ -18,20 +19,17 @@ from generated import generated
 from measure import Row
 from others import catalog, derivations, jacobians, modes, platforms
 from sweeps import exact_maxima, growth, matrices, other_twists
+from tracked import HEADER, tracked
 
-from tables.markdown import replace_between, table
-
-START = "<!-- generated: benchmarks -->"
+from tables.markdown import rewrite, table
 
 
 def main(arguments: Sequence[str]) -> None:
-    made = table(("what", "ours", "theirs", "theirs / ours"), lines(), 3)
-    if not arguments:
-        print(made)
-        return
-    file = Path(arguments[0])
-    made = replace_between(file.read_text(encoding="utf-8"), made, START)
-    file.write_text(made, encoding="utf-8", newline="\n")
+    tables = {start: make for start, make in TABLES.items() if start in arguments[1:] or not arguments[1:]}
+    if arguments:
+        rewrite(arguments[0], tables)
+    else:
+        print(*(make() for make in tables.values()), sep="\n")
 
 
 def lines() -> Iterator[Row]:
@@ -46,6 +44,11 @@ def lines() -> Iterator[Row]:
     yield from catalog()
     yield from growth()
 
+
+TABLES = {
+    "<!-- generated: benchmarks -->": lambda: table(("what", "ours", "theirs", "theirs / ours"), lines(), 3),
+    "<!-- generated: tracked -->": lambda: table(HEADER, tracked(), 3),
+}
 
 if __name__ == "__main__":
     main(sys.argv[1:])
