@@ -1,4 +1,4 @@
-"""Draw the figures of the glossary, each computed from the geometry of the five-bar ``rrrrr_m1``.
+"""Draw figures of the glossary and of a tracked branch, each computed from the geometry of the five-bar ``rrrrr_m1``.
 
 ``python docs/figures.py [NAME ...]`` draws them (default: all). Angles are in radians, lengths in metres, directions
 are given by their angles with the x axis.
@@ -6,7 +6,10 @@ are given by their angles with the x axis.
 
 from __future__ import annotations
 
+import subprocess
 import sys
+import sysconfig
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -27,6 +30,8 @@ A, B, C = (
     for names in (("shoulder_1", "shoulder_2"), ("elbow_1", "elbow_2"), ("end",))
 )
 CRANK, ROD = np.linalg.norm(B - A, axis=1), np.linalg.norm(C - B, axis=1)
+HOME = np.arctan2(*(B - A).T[::-1])
+"""Angles of the cranks in the zero configuration."""
 WORKING = (1, -1)
 """Signs of the working mode of the zero configuration: on which side of the line from A to the tip each elbow lies."""
 BOX = {"boxstyle": "round,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.7}
@@ -197,20 +202,52 @@ def branch(axes: Axes) -> None:
     axes.set(xlabel="motor 1 (degrees)", ylabel="direction of rod 1 (degrees)", xticks=[-180, -90, 0, 90, 180])
 
 
+def toggle(axes: Axes) -> None:
+    """The loop of the page on trackers: motor 1, room and speed against time, and the five-bar where it turns back."""
+    page = (FOLDER.parent / "pages" / "export_a_controller.md").read_text(encoding="utf-8")
+    with tempfile.TemporaryDirectory() as folder:
+        here = Path(folder)
+        (here / "robot.hpp").write_text(hrsynth.export(ROBOT).code, encoding="utf-8")
+        (here / "main.cpp").write_text(page.split("```cpp\n")[1].split("```")[0], encoding="utf-8")
+        eigen = Path(sysconfig.get_paths()["purelib"]) / "cmeel.prefix" / "include" / "eigen3"
+        subprocess.run(["g++", "-std=c++17", f"-isystem{eigen}", "main.cpp", "-o", "main"], cwd=here, check=True)
+        out = subprocess.run([here / "main"], capture_output=True, text=True, check=True).stdout
+    cycle, _, motor, room, speed = np.array([line.split() for line in out.splitlines()], dtype=float).T
+    for values, text, at, colour in (
+        (10 * motor, "motor 1 (0.1 rad)", 270, PAGE["ink"]),
+        (room, "room", 250, GOAL),
+        (speed, "speed (rad/s)", 30, OBSERVED),
+    ):
+        axes.plot(cycle, values, color=colour)
+        label(axes, text, np.array([cycle[at], values[at]]), (4, 8), colour)
+    turns = np.stack([np.linspace(0, 1, 1001), np.zeros(1001)], -1)
+    gap = np.linalg.norm(np.subtract(*solve_tip(HOME + turns)[0]), axis=-1)
+    end = 10 * turns[np.argmax(gap > ROD.sum()), 0]
+    axes.axhline(end, color=TYPE2, lw=1, ls="--")
+    label(axes, "toggle", np.array([0, end]), (0, 8), TYPE2)
+    axes.set(xlabel="time (ms)", ylim=(-2.5, 10), yticks=range(-2, 5))
+    inset = axes.inset_axes((0.2, 0.6, 0.6, 0.4))
+    elbows, tip = solve_tip(HOME + np.array([motor.max(), 0.0]))
+    draw_robot(inset, *reversed(solve_tip(HOME)), 0.3)
+    draw_robot(inset, tip, elbows)
+    inset.set(aspect="equal")
+    inset.axis("off")
+
+
 FIGURES: dict[str, Callable[[Axes], None]] = {
-    figure.__name__: figure for figure in (assembly_mode, working_mode, aspect, equilibrium, branch)
+    figure.__name__: figure for figure in (assembly_mode, working_mode, aspect, equilibrium, branch, toggle)
 }
 
 
 def draw(name: str) -> None:
-    """Draw one figure to ``docs/pictures/glossary_NAME.svg``."""
+    """Draw one figure to ``docs/pictures/glossary_NAME.svg``, or ``track_toggle.svg``."""
     with plt.style.context("hrsynth.present.style"), plt.rc_context({"svg.hashsalt": name}):
         figure, axes = plt.subplots(figsize=(3.6, 3.3), layout="constrained")
         FIGURES[name](axes)
         if not axes.get_xlabel():
             axes.set(aspect="equal", xticks=[], yticks=[])
             axes.axis("off")
-        figure.savefig(FOLDER / f"glossary_{name}.svg", metadata={"Date": None})
+        figure.savefig(FOLDER / f"{'track' if name == 'toggle' else 'glossary'}_{name}.svg", metadata={"Date": None})
         plt.close(figure)
 
 

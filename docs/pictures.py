@@ -89,6 +89,7 @@ PICTURES: dict[str, str | Page | Family | Screen | Drawing] = {
     "report_quattro.png": Page("derive quattro --observe 1,4", "--report", 1200, 1500),
     "servo_quattro.gif": f"servo quattro --observe 1,4 {MOTION} --dynamics --sense images",
     "studio_legs.webp": Screen("quattro", "unobserved"),
+    "track_toggle.svg": Drawing("toggle"),
 }
 """Sources of the pictures: arguments of ``hrsynth … -o``, a page, or (the derivation) robot and legs."""
 

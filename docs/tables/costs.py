@@ -35,6 +35,7 @@ COMMANDS = (
     "singularities {robot}",
     "select {robot} --start x={start} --goal x={goal}",
     "branch {robot}",
+    "export {robot}",
     "equilibria {robot}",
 )
 """Command lines without limits of work, all legs observed."""
