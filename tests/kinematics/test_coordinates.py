@@ -13,6 +13,7 @@ from hrsynth.description import load
 from hrsynth.geometry.vectors import convert_rpy_to_rotation
 from hrsynth.kinematics.continuation import track
 from hrsynth.kinematics.coordinates import Coordinates
+from hrsynth.mechanism.pose import Pose
 from oracle import exponential
 from strategies import planar, transformed
 
@@ -79,10 +80,14 @@ def test_the_turn_about_a_tilted_axis_is_its_angle():
     setup = ObservedRobot.of(transformed(load("quattro"), R, np.zeros(3)), samples=3)
     start, motion = setup.all_samples.start, setup.motion
     coordinates = Coordinates.of(start, setup.all_samples.observation_model, motion)
-    assert coordinates.names[3] == "turn about " + " ".join(f"{x:.3g}" for x in R[:, 2])
+    assert coordinates.names[3] == "phi"
     for value, at in coordinates.along(start, 3, (0.3, 0.3), 3):
         turn = at.pose(motion.link)[:3, :3] @ motion.home[:3, :3].T
         assert turn == pytest.approx(exponential(value * R[:, 2]), abs=1e-8)
+        written = motion.pose(at.pose(motion.link))
+        assert Pose.parse(str(written)).phi == pytest.approx(value, abs=1e-7)
+        again = track_to_pose(start, setup.all_samples.observation_model, Pose.parse(str(written)), motion)
+        assert again.pose(motion.link) == pytest.approx(at.pose(motion.link), abs=2e-6)
 
 
 def test_an_angle_is_the_same_after_a_whole_turn():

@@ -28,6 +28,7 @@ angles = st.floats(-3, 3).map(lambda value: round(value, 4) + 0.0)
         ("phi=10deg", Pose(phi=radians(10))),
         ("phi=-0.5", Pose(phi=-0.5)),
         ("x=1,rpy=0.1/0/-90deg", Pose(x=1, rpy=(0.1, 0.0, -pi / 2))),
+        ("x=20mm,z=-700 mm", Pose(x=0.02, z=-0.7)),
     ],
 )
 def test_what_may_be_written(text: str, wanted: Pose) -> None:
@@ -48,6 +49,7 @@ def test_what_may_be_written(text: str, wanted: Pose) -> None:
         ("y=inf", "not finite"),
         ("z=-inf", "not finite"),
         ("x=1deg", "not a number"),
+        ("phi=1mm", "not a number"),
         ("phi=deg", "not a number"),
         ("phi=1e999", "not finite"),
         ("rpy=0/0", "rpy"),
@@ -111,6 +113,31 @@ def test_a_grid_runs_its_last_axis_fastest() -> None:
     assert {(p.y, p.z, p.rpy) for p in grid.poses()} == {(None, -0.7, None)}
 
 
+def test_two_numbers_are_a_position_in_a_plane() -> None:
+    assert parse_poses([0.1, 0.2]) == [Pose(0.1, 0.2)]
+    assert parse_poses([[0.1, 0.2], [0.3, 0.4, 0.5]]) == [Pose(0.1, 0.2), Pose(0.3, 0.4, 0.5)]
+
+
+@given(st.permutations(["roll", "pitch", "yaw"]), angles, angles, angles)
+def test_the_turns_of_a_grid_are_those_of_rpy(names: list[str], low: float, high: float, held: float) -> None:
+    if abs(high - low) < 1e-3:
+        high = low + 1
+    grid = Grid.parse(f"{names[0]}={low!r}:{high!r}:3,{names[1]}={held!r},x=5mm")
+    for value, pose in zip(np.linspace(low, high, 3), grid.poses(), strict=True):
+        turns = {names[0]: value, names[1]: held, names[2]: 0.0}
+        assert pose.rpy == pytest.approx([turns[name] for name in ("roll", "pitch", "yaw")])
+        assert pose.x == 0.005
+    assert Grid.parse(str(grid)).poses()[-1].rpy == pytest.approx(grid.poses()[-1].rpy, abs=1e-5)
+
+
+def test_a_grid_of_joints_requests_each_cell() -> None:
+    grid = Grid.parse("motors:a=-10deg:10deg:3,c=0.2,b=0:20mm:2")
+    assert (grid.joints, grid.shape, str(Grid.parse(str(grid)))) == ("motors", (3, 2), str(grid))
+    asked = [each.given for each in grid.requests_at(np.ndindex(grid.shape))]
+    assert asked[1] == {"a": (pytest.approx(-pi / 18),), "b": (0.02,), "c": (0.2,)}
+    assert asked[2]["a"] == (pytest.approx(0.0),)
+
+
 @pytest.mark.parametrize(
     ("text", "what"),
     [
@@ -127,6 +154,13 @@ def test_a_grid_runs_its_last_axis_fastest() -> None:
         ("phi=0:1:3,rpy=0/0/0", "both phi and rpy"),
         ("x=0:1:-3", "count"),
         ("v=0:1:3", "unknown part"),
+        ("roll=0:1:3,phi=0", "phi and roll"),
+        ("roll=0:1:3,rpy=0/0/0", "rpy and roll"),
+        ("roll=0,phi=0:1:3", "phi and roll"),
+        ("motors:a=0", "number of ranges"),
+        ("motors:0:1:3", "name=value"),
+        ("joints:a=0:1:3,a=1", "twice"),
+        ("joints:a=0:b:3", "not a number"),
     ],
 )
 def test_what_is_refused_of_a_grid(text: str, what: str) -> None:

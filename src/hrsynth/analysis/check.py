@@ -251,7 +251,11 @@ def check(
     ] = (),
     grid: Annotated[
         Grid | str | None,
-        option("A line, plane or box of poses, such as x=-0.3:0.3:21,y=-0.3:0.3:21,z=-0.7 (from:to:count).", "GRID"),
+        option(
+            "A line, plane or box of poses, such as x=-0.3:0.3:21,y=-0.3:0.3:21,z=-0.7 (from:to:count) or "
+            "motors:NAME=-0.5:0.5:21.",
+            "GRID",
+        ),
     ] = None,
     seed: Seed = 0,
 ) -> Checked:
@@ -264,7 +268,7 @@ def check(
     at
         Poses (m, rad, base coordinates); default: the zero configuration.
     grid
-        Line, plane or box of poses, such as ``x=-0.3:0.3:21,y=0`` (from:to:count).
+        Line, plane or box of poses, such as ``x=-0.3:0.3:21,y=0`` (from:to:count) or ``motors:arm_1=-0.5:0.5:21``.
     seed
         Seed of the random configurations that define generic values.
 
@@ -324,7 +328,7 @@ def check(
         swept = GridCheck(
             cells,
             tuple(None if each is None else examiner.classify(each) for each in places),
-            motion.free({*cells.names, *cells.fixed.given}),
+            () if cells.joints else motion.free(cells.parts),
             dependent,
         )
     return Check(setup, postures, list_redundant(examiner.redundant, generic=True), swept, unreached)

@@ -10,7 +10,7 @@ from ..geometry.so3 import convert_vectors_to_rotations
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import PlatformMotion, PoseTask
-from ..mechanism.pose import Grid
+from ..mechanism.pose import TURNS, Grid
 from ..tolerances import HIDDEN_ROBOT_RESIDUAL_TOL, RANK_CUTOFF_FRACTION
 from .configuration_builder import ConfigurationBuilder
 from .engine import Flags
@@ -45,6 +45,9 @@ def list_grid_poses(motion: PlatformMotion, grid: Grid, robot: str, places: Arra
     first = motion.goal(grid.poses_at([(0,) * grid.ndim])[0], robot)
     columns = dict(zip(grid.names, places.T, strict=True))
     X = np.tile(motion.pose_of(first), (len(places), 1, 1))
+    if {*TURNS} & columns.keys():
+        goals = (motion.goal(grid.pose(values), robot) for values in places)
+        X[:, :3, :3] = [motion.pose_of(goal)[:3, :3] for goal in goals]
     if "phi" in columns:
         X[:, :3, :3] = convert_vectors_to_rotations(columns["phi"][:, None] * motion.normal) @ motion.home[:3, :3]
     values = np.tile(first.values, (len(places), 1))

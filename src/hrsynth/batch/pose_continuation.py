@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Container, Iterator, Sequence
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -21,13 +21,14 @@ from ..kinematics.continuation import (
     is_goal_dependent,
     track,
 )
+from ..kinematics.joint_coordinates import track_to_joints
 from ..kinematics.leg_reach import find_beyond_rods, find_worst_leg
 from ..kinematics.limits import find_tilt_at_end, list_tilts_beyond
 from ..kinematics.platform_motion import PlatformMotion, PoseTask
 from ..kinematics.tasks import Task, stack_task
 from ..kinematics.velocity_relation import ObservationModel
 from ..kinematics.walking import walk_randomly
-from ..mechanism.pose import Grid, Pose
+from ..mechanism.pose import Grid, JointPose, Pose
 from ..progress import report
 from ..tolerances import PRINTED_POSE_TOL
 
@@ -95,6 +96,8 @@ def explain_dependence(
 
 def explain_grid_dependence(start: ClosedConfiguration, motion: PlatformMotion, grid: Grid) -> str | None:
     """Return the text of :func:`explain_dependence` for the poses of a grid."""
+    if grid.joints:
+        return None
     goal = motion.goal(next(iter(grid.poses_at([(0,) * grid.ndim]))), start.model.mechanism.name)
     return explain_dependence(start, motion, goal, "these poses")
 
@@ -172,8 +175,10 @@ def sweep(
     every neighbour. The first is the reachable one nearest to ``start``.
 
     A ``placer`` gives them at once where the legs are known subproblems and free parts can stay as they are at zero;
-    only the others are led there step by step."""
+    only the others are led there step by step. A cell of joints is where the straight line from zero leads."""
     motion = motion or find_generic_motion(start, observation_model)
+    if grid.joints:
+        return tuple(_sweep_joints(start, motion, grid))
     goals = [motion.goal(pose, start.model.mechanism.name) for pose in grid.poses()]
     home = motion.at_home()
     from .grids import find_ready_configurations
@@ -197,6 +202,18 @@ def sweep(
         return there if came == 1 and _has_arrived(there, goals[cell]) else None
 
     return spread(start, grid.shape, goals, lead, at_once)
+
+
+def _sweep_joints(
+    start: ClosedConfiguration, motion: PlatformMotion, grid: Grid
+) -> Iterator[ClosedConfiguration | None]:
+    """Yield the configurations of a grid of joints or motors, each at the end of the straight line from zero."""
+    for asked in grid.requests_at(np.ndindex(grid.shape)):
+        report("poses")
+        try:
+            yield track_to_joints(start, motion, cast(JointPose, asked))[0]
+        except PoseReachFailure:
+            yield None
 
 
 def spread(

@@ -14,9 +14,8 @@ import numpy as np
 
 from ..geometry.screws import compute_point_velocity
 from ..geometry.so3 import compute_rotation_vector_rate, convert_rotations_to_vectors, turn_about, wrap_angle
-from ..geometry.vectors import Array, orient_axis
+from ..geometry.vectors import Array
 from ..results import Value
-from ..tolerances import DIRECTION_SINE_TOL
 from .configuration import ClosedConfiguration
 from .continuation import track
 from .pinocchio_model import PinocchioModel
@@ -51,7 +50,7 @@ class Coordinates(Value):
         if twists.shape[1] != motion.dof:
             twists = motion.twists
         if motion.rotations.shape[1] == 1:
-            twists = np.vstack([twists[:3], _find_rotation_axis(motion) @ twists[3:]])
+            twists = np.vstack([twists[:3], motion.normal @ twists[3:]])
         rows = twists if motion.body else twists[:3]
         size = min(motion.dof, len(rows))
         sets = list(combinations(range(len(rows)), size))
@@ -63,11 +62,7 @@ class Coordinates(Value):
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the coordinates."""
-        names: tuple[str, ...] = NAMES
-        if self.motion.rotations.shape[1] == 1:
-            axis = _find_rotation_axis(self.motion)
-            plain = abs(axis @ self.motion.normal) > 1 - DIRECTION_SINE_TOL
-            names = *NAMES[:3], "phi" if plain else f"turn about {' '.join(f'{x:.3g}' for x in axis)}"
+        names = (*NAMES[:3], "phi") if self.motion.has_one_rotation else NAMES
         return tuple(names[place] for place in self.places)
 
     def read(self, X: Array) -> Array:
@@ -86,7 +81,7 @@ class Coordinates(Value):
         """Return the rotation since the zero configuration, and the map from the angular velocity to its rate."""
         R = X[:3, :3] @ self.motion.home[:3, :3].T
         if self.motion.rotations.shape[1] == 1:
-            angle, row = turn_about(_find_rotation_axis(self.motion), R)
+            angle, row = turn_about(self.motion.normal, R)
             return np.array([angle]), row[None]
         turn = convert_rotations_to_vectors(R)
         return turn, compute_rotation_vector_rate(turn)
@@ -142,8 +137,3 @@ class Coordinates(Value):
         values = self.values.copy()
         values[index] = value
         return replace(self, values=values)
-
-
-def _find_rotation_axis(motion: PlatformMotion) -> Array:
-    """Return the one axis about which a platform rotates, (3,), with the sense of phi if that rotates about it."""
-    return orient_axis(motion.rotations[:, 0])

@@ -168,14 +168,14 @@ def _convert_requested(home: ClosedConfiguration, asked: JointPose) -> dict[str,
         robot.require_motors()
     if not joints:
         raise BadRequest(f"{asked}: {robot.name} has no joint with coordinates", remedy="Use a pose of the platform.")
-    given, degrees = dict(asked.values), {*asked.degrees}
+    given, units = dict(asked.values), dict(asked.units)
     if "" in given:
         flat = [x for _, part in asked.values for x in part]
         if len(flat) != sum(sizes.values()):
             allowed = f"{sum(sizes.values())}: {', '.join(joints)}"
             raise BadRequest(f"{robot.name}: number of {asked.kind}", len(flat), allowed)
         ends = np.cumsum([0, *sizes.values()])
-        degrees = {name for name, i in zip(joints, ends, strict=False) if str(i) in degrees}
+        units = {name: units[str(i)] for name, i in zip(joints, ends, strict=False) if str(i) in units}
         given = {name: tuple(flat[i:j]) for name, i, j in zip(joints, ends, ends[1:], strict=False)}
     for name, values in given.items():
         if name not in joints:
@@ -186,8 +186,10 @@ def _convert_requested(home: ClosedConfiguration, asked: JointPose) -> dict[str,
                 "/".join(map(str, values)),
                 "one number" if sizes[name] == 1 else "two numbers, as 0.1/0.2",
             )
-        if name in degrees and joints[name].type.has_translation:
-            raise BadRequest(f"{robot.name}: unit of prismatic joint {name}", "degrees", "metres")
+        slides = joints[name].type.has_translation
+        if units.get(name) == ("deg" if slides else "mm"):
+            kind, unit = ("prismatic", "metres or mm") if slides else ("revolute", "radians or deg")
+            raise BadRequest(f"{robot.name}: unit of {kind} joint {name}", units[name], unit)
         low, high = robot.filed.get(name, (-np.inf, np.inf))
         if not low - POINT_DISTANCE_TOL <= min(values) <= max(values) <= high + POINT_DISTANCE_TOL:
             told = "/".join(map(str, values))

@@ -157,13 +157,8 @@ class PlatformMotion(Value):
 
     @property
     def normal(self) -> Array:
-        """The axis of phi: the normal of a planar robot's plane (its largest component positive), else z."""
-        if self.rotations.shape[1] != 1:
-            return np.array([0.0, 0.0, 1.0])
-        normal = self.rotations[:, 0]
-        if np.linalg.norm(normal @ self.translations) > RANK_CUTOFF_FRACTION:
-            return np.array([0.0, 0.0, 1.0])
-        return orient_axis(normal)
+        """The axis of phi: the one about which the platform rotates (its largest component positive), else z."""
+        return orient_axis(self.rotations[:, 0]) if self.rotations.shape[1] == 1 else np.array([0.0, 0.0, 1.0])
 
     @property
     def is_planar(self) -> bool:
@@ -173,9 +168,7 @@ class PlatformMotion(Value):
     @property
     def has_one_rotation(self) -> bool:
         """True if its only rotation is phi."""
-        return (
-            self.rotations.shape[1] == 1 and abs(float(self.normal @ self.rotations[:, 0])) > 1 - RANK_CUTOFF_FRACTION
-        )
+        return self.rotations.shape[1] == 1
 
     @property
     def parts(self) -> tuple[str, ...]:

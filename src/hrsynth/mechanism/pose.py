@@ -6,11 +6,11 @@ The platform's frame in the base frame, metres and radians.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import Annotated, Any, Protocol, TypedDict, cast
+from typing import TYPE_CHECKING, Annotated, Any, Protocol, TypedDict, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +22,9 @@ from ..records import FLAT, As, Record, recorded
 from ..results import Value
 from ..tolerances import POSE_VALUE_MAX, PRINTED_POSE_TOL
 
+if TYPE_CHECKING:
+    from .model import Mechanism
+
 HALF_TURN_TOL_RAD = 5e-7
 """Angle (radians) from -pi within which a rotation is printed as pi."""
 GRID_CELLS_MAX = 100_000
@@ -29,15 +32,21 @@ GRID_CELLS_MAX = 100_000
 JOINT_VALUE_MAX = 100.0
 """Largest joint value (metres, radians) of a request; paths to it use small steps."""
 
-SCALARS = ("x", "y", "z", "phi")
+UNITS: dict[str, Callable[[float], float]] = {"deg": math.radians, "mm": lambda number: number / 1000}
+"""Units with which numbers may be written, and their conversion to radians and metres."""
+LENGTHS = ("x", "y", "z")
+SCALARS = (*LENGTHS, "phi")
 PARTS = (*SCALARS, "rpy")
+TURNS = ("roll", "pitch", "yaw")
+"""The angles of rpy, as parts of a grid."""
+ANGLES = ("phi", "rpy", *TURNS)
 EXAMPLE = "x=0.02,y=0.1,z=-0.7, and phi=10deg or rpy=0.1/0/0"
 
 
 @dataclass(frozen=True)
 class Pose(Record):
-    """Parts of a platform's pose; None is free. ``phi`` is the rotation from the zero configuration about the base
-    frame's z (for a planar robot about the normal of its plane), ``rpy`` URDF's fixed-axis roll, pitch, yaw."""
+    """Parts of a platform's pose; None is free. ``phi`` is the rotation from the zero configuration about the one axis
+    about which the platform rotates, or else about the base frame's z, ``rpy`` URDF's fixed-axis roll, pitch, yaw."""
 
     x: Annotated[float | None, "null: free"] = None
     y: Annotated[float | None, "null: free"] = None
@@ -139,8 +148,8 @@ class JointPose:
     motors: bool
     values: tuple[tuple[str, tuple[float, ...]], ...]
     """Coordinates by name; without names (empty) in the order of the file."""
-    degrees: tuple[str, ...] = ()
-    """Names, or numbers in the order of the file, of those given in degrees."""
+    units: tuple[tuple[str, str], ...] = ()
+    """Names, or numbers in the order of the file, of those given with a unit (``deg``, ``mm``), and that unit."""
 
     @classmethod
     def of(cls, kind: str, given: Any) -> JointPose:
@@ -163,7 +172,7 @@ class JointPose:
         return cls(
             kind == "motors",
             tuple((name, values) for name, values, _ in read),
-            tuple(name or str(number) for number, (name, _, degrees) in enumerate(read) if degrees),
+            tuple((name or str(number), unit) for number, (name, _, unit) in enumerate(read) if unit),
         )
 
     @property
@@ -171,33 +180,34 @@ class JointPose:
         """``motors`` or ``joints``."""
         return "motors" if self.motors else "joints"
 
+    @property
+    def given(self) -> dict[str, tuple[float, ...]]:
+        """Coordinates by name."""
+        return dict(self.values)
+
     def __str__(self) -> str:
         parts = ((name and f"{name}=") + "/".join(map(_write_number, each)) for name, each in self.values)
-        return f"{self.kind}:{','.join(parts)}"
+        return f"{self.kind}:{','.join(parts)}" if self.values else ""
 
 
-def _parse_coordinates(kind: str, given: Any) -> tuple[tuple[float, ...], bool]:
-    """Return the coordinates of one joint, and True if they are in degrees: numbers in metres or radians, or a text
-    with / between, degrees with ``deg``."""
+def _parse_coordinates(kind: str, given: Any) -> tuple[tuple[float, ...], str]:
+    """Return the coordinates of one joint, and the unit if they have one: numbers in metres or radians, or a text with
+    / between, such as ``5deg`` or ``20mm``."""
     try:
         if isinstance(given, str):
-            typed = [part.strip() for part in given.split("/")]
-            digits = [part.removesuffix("deg") for part in typed]
-            numbers = [
-                float(np.radians(parse_plain_number(x))) if x != part else parse_plain_number(x)
-                for part, x in zip(typed, digits, strict=True)
-            ]
+            read = [_read_number(part.strip(), tuple(UNITS)) for part in given.split("/")]
+            numbers, unit = [number for number, _ in read], max(unit for _, unit in read)
         else:
-            typed, digits, numbers = [], [], np.atleast_1d(given).tolist()
+            numbers, unit = np.atleast_1d(given).tolist(), ""
         if all(isinstance(x, int | float) and not isinstance(x, bool) and abs(x) < JOINT_VALUE_MAX for x in numbers):
-            return tuple(map(float, numbers)), typed != digits
+            return tuple(map(float, numbers)), unit
     except (TypeError, ValueError, OverflowError):
         pass
-    unit = f"metres or radians below {JOINT_VALUE_MAX:g}, or degrees with deg"
-    raise BadRequest(f"{kind} of a pose: not a number of {unit}", given, JOINT_POSES)
+    expected = f"metres or radians below {JOINT_VALUE_MAX:g}, or with deg or mm"
+    raise BadRequest(f"{kind} of a pose: not a number of {expected}", given, JOINT_POSES)
 
 
-JOINT_POSES = "joints:NAME=VALUE,… or motors:VALUE,VALUE,… in the order of the file (m, rad, or degrees with deg)"
+JOINT_POSES = "joints:NAME=VALUE,… or motors:VALUE,VALUE,… in the order of the file (m, rad, or with mm, deg)"
 
 
 class RigidTransform(Protocol):
@@ -209,10 +219,10 @@ class RigidTransform(Protocol):
 
 AskedPose = Pose | ModeNumber | JointPose
 PoseLike = AskedPose | str | Mapping[str, Any] | ArrayLike | RigidTransform
-"""Pose as a user gives it: a text, a dict of its parts, x y z (roll pitch yaw), a matrix (4, 4), an SE3 of Pinocchio;
+"""Pose as a user gives it: a text, a dict of its parts, x y (z (roll pitch yaw)), a matrix (4, 4), an SE3 of Pinocchio;
 coordinates as ``{"joints": {"knee": 0.3}}`` or ``{"motors": [0.1, 0.2]}``, in the order of the file."""
 POSES = (
-    f"a text such as {EXAMPLE}; a dict of these; numbers x, y, z or x, y, z, roll, pitch, yaw; a 4 × 4 matrix; "
+    f"a text such as {EXAMPLE}; a dict of these; numbers x, y or x, y, z or x, y, z, roll, pitch, yaw; a 4 × 4 matrix; "
     "a pinocchio.SE3"
 )
 
@@ -242,10 +252,10 @@ def convert_to_pose(given: PoseLike) -> Pose:
         ):
             raise BadRequest("pose: not the matrix of a rotation and a translation", numbers.tolist(), POSES)
         return Pose.of(numbers)
-    if numbers.shape not in ((3,), (6,)):
+    if numbers.shape not in ((2,), (3,), (6,)):
         raise BadRequest("a pose", given, POSES)
-    x, y, z, *rpy = numbers.tolist()
-    return Pose(x, y, z, rpy=(rpy[0], rpy[1], rpy[2]) if rpy else None)
+    x, y, *more = numbers.tolist()
+    return Pose(x, y, more[0] if more else None, rpy=(more[1], more[2], more[3]) if len(more) > 1 else None)
 
 
 def _format_value(value: Any) -> str:
@@ -268,7 +278,7 @@ def parse_poses(given: PoseLike | Iterable[PoseLike] | None) -> list[AskedPose]:
         several = list(given)
         with suppress(ValueError):
             numbers = np.array(several)
-            if numbers.dtype.kind in "iuf" and numbers.shape in ((3,), (6,), (4, 4)):
+            if numbers.dtype.kind in "iuf" and numbers.shape in ((2,), (3,), (6,), (4, 4)):
                 several = [numbers]
     return [parse_pose(each) for each in several]
 
@@ -296,74 +306,115 @@ def parse_pose(given: PoseLike) -> AskedPose:
 
 
 class GridValues(TypedDict, total=False):
-    """Values of the parts that vary."""
+    """Values of the parts, or of the joints or motors, that vary."""
 
     x: list[float]
     y: list[float]
     z: list[float]
     phi: list[float]
+    roll: list[float]
+    pitch: list[float]
+    yaw: list[float]
+    joints: dict[str, list[float]]
+    motors: dict[str, list[float]]
 
 
 class FixedParts(TypedDict, total=False):
-    """Parts of the pose that a grid keeps constant."""
+    """Parts of the pose, or coordinates of joints or motors, that a grid keeps constant."""
 
     x: float
     y: float
     z: float
     phi: float
     rpy: list[float]
+    joints: dict[str, list[float]]
+    motors: dict[str, list[float]]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Grid(Value):
-    """Line, plane or box of poses: the parts that vary with their values, and a pose with the other parts."""
+    """Line, plane or box of poses: the parts that vary with their values, and a pose with the other parts; or the
+    same of coordinates of joints or motors."""
 
     axes: tuple[tuple[str, Array], ...]
-    fixed: Pose
+    fixed: Pose | JointPose
 
     @classmethod
     def parse(cls, text: Grid | str, largest: int = GRID_CELLS_MAX) -> Grid:
         """Return the grid written as ``x=-0.3:0.3:21,y=0:0.1:5,z=-0.7`` (from:to:count), of at most ``largest`` poses,
-        or a given grid. Raises ``BadRequest``."""
+        the same of ``motors:…`` or ``joints:…``, or a given grid. Raises ``BadRequest``."""
         if isinstance(text, Grid):
             return text
         if not isinstance(text, str):
-            raise BadRequest("a grid", text, "a text such as x=-0.3:0.3:21,y=-0.3:0.3:21,z=-0.7")
+            raise BadRequest("a grid", text, GRIDS)
+        kind, colon, rest = text.strip().partition(":")
+        kind = kind if colon and kind in ("joints", "motors") else ""
         axes: list[tuple[str, Array]] = []
-        single: list[str] = []
-        for name, value in _split_fields(text, "grid"):
+        single: dict[str, str] = {}
+        units: list[tuple[str, str]] = []
+        for name, value in _split_fields(rest if kind else text, "grid", () if kind else (*SCALARS, *TURNS, "rpy")):
             if ":" not in value:
-                single.append(f"{name}={value}")
+                single[name] = value
             elif name == "rpy":
-                raise BadRequest("grid: a range of rpy", value, "ranges of " + ", ".join(SCALARS))
+                raise BadRequest("grid: a range of rpy", value, "ranges of " + ", ".join((*SCALARS, *TURNS)))
             else:
                 axes.append((name, _parse_range(value, name, text, largest)))
+                units += [(name, unit) for unit in UNITS if unit in value]
         if not 1 <= len(axes) <= 3:
-            raise BadRequest("grid: number of ranges", text, "one to three, such as x=-0.3:0.3:21,y=-0.3:0.3:21,z=-0.7")
+            raise BadRequest("grid: number of ranges", text, f"one to three, such as {GRIDS}")
         cells = math.prod(len(values) for _, values in axes)
         if cells > largest:
             raise BadRequest("grid: number of poses", cells, f"at most {largest}")
-        fixed = Pose.parse(",".join(single)) if single else Pose()
-        if fixed.rpy is not None and "phi" in dict(axes):
-            raise BadRequest("grid: both phi and rpy are given", text, "one of them")
-        return cls(tuple(axes), fixed)
+        if kind:
+            held = JointPose.of(kind, single) if single else JointPose(kind == "motors", ())
+            return cls(tuple(axes), replace(held, units=(*held.units, *units)))
+        return cls(tuple(axes), _parse_fixed_parts(single, [name for name, _ in axes], text))
 
     def __str__(self) -> str:
+        kind = self.joints and f"{self.joints}:"
         ranges = [f"{name}={values[0]:.6g}:{values[-1]:.6g}:{len(values)}" for name, values in self.axes]
-        return ",".join([*ranges, *([str(self.fixed)] if self.fixed.given else [])])
+        return kind + ",".join([*ranges, *([self.fixed_text.removeprefix(kind)] if self.fixed_text else [])])
+
+    @property
+    def fixed_text(self) -> str:
+        """The parts that do not vary, empty if there are none."""
+        if isinstance(self.fixed, JointPose) or not {*TURNS} & {*self.names}:
+            return str(self.fixed) if self.fixed.given else ""
+        turns = dict(zip(TURNS, self.fixed.rpy or (), strict=True))
+        single = {name: (angle,) for name, angle in turns.items() if name not in self.names}
+        return write_parts({**self.fixed.without(["rpy"]).given, **single})
+
+    @property
+    def joints(self) -> str:
+        """``joints`` or ``motors`` if their coordinates vary, else empty."""
+        return self.fixed.kind if isinstance(self.fixed, JointPose) else ""
 
     @property
     @recorded(FLAT)
     def values_record(self) -> GridValues:
         """Values of the parts that vary."""
-        return cast(GridValues, dict(self.axes))
+        return cast(GridValues, {self.joints: dict(self.axes)} if self.joints else dict(self.axes))
 
     @property
     @recorded(As("fixed"))
     def fixed_record(self) -> FixedParts:
         """Parts of the pose that the grid keeps constant."""
+        if self.joints:
+            return cast(FixedParts, {self.joints: self.fixed.given} if self.fixed.given else {})
         parts = {name: values if name == "rpy" else values[0] for name, values in self.fixed.given.items()}
         return cast(FixedParts, parts)
+
+    @property
+    def parts(self) -> set[str]:
+        """Parts of the platform's pose that vary or are given; none in a grid of joints."""
+        names = {"rpy" if name in TURNS else name for name in self.names}
+        return set() if self.joints else names | {*self.fixed.given}
+
+    def list_units(self, robot: Mechanism) -> tuple[str, ...]:
+        """Return the unit of each axis for a robot, ``m`` or ``rad``."""
+        if self.joints:
+            return tuple("m" if robot.joints[name].type.has_translation else "rad" for name in self.names)
+        return tuple("rad" if name in ANGLES else "m" for name in self.names)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -397,19 +448,48 @@ class Grid(Value):
         return np.stack([values[i] for (_, values), i in zip(self.axes, on, strict=True)], axis=1)
 
     def poses(self) -> tuple[Pose, ...]:
-        """Return the poses of all cells, the last axis running fastest."""
+        """Return the platform's poses of all cells, the last axis running fastest."""
         return self.poses_at(product(*(range(size) for size in self.shape)))
 
     def poses_at(self, cells: Iterable[Sequence[int]]) -> tuple[Pose, ...]:
-        """Return the poses of cells, each given by its index on every axis."""
-        return tuple(
-            self.pose([float(values[i]) for (_, values), i in zip(self.axes, cell, strict=True)]) for cell in cells
-        )
+        """Return the platform's poses of cells, each given by its index on every axis."""
+        return tuple(map(self.pose, self._list_values(cells)))
 
     def pose(self, values: Sequence[float]) -> Pose:
-        """Return the pose with these values of the parts that vary."""
+        """Return the platform's pose with these values of the parts that vary."""
+        if isinstance(self.fixed, JointPose):
+            raise BadRequest("a grid of poses", str(self), GRIDS)
         given: dict[str, Any] = dict(zip(self.names, values, strict=True))
+        if {*TURNS} & given.keys():
+            rpy = self.fixed.rpy or (0.0, 0.0, 0.0)
+            given["rpy"] = tuple(given.pop(name, angle) for name, angle in zip(TURNS, rpy, strict=True))
         return replace(self.fixed, **given)
+
+    def requests_at(self, cells: Iterable[Sequence[int]]) -> tuple[Pose | JointPose, ...]:
+        """Return the poses of cells as they are requested, of joints too."""
+        if not isinstance(held := self.fixed, JointPose):
+            return self.poses_at(cells)
+        varied = (tuple((name, (x,)) for name, x in zip(self.names, v, strict=True)) for v in self._list_values(cells))
+        return tuple(replace(held, values=(*values, *held.values)) for values in varied)
+
+    def _list_values(self, cells: Iterable[Sequence[int]]) -> Iterator[list[float]]:
+        for cell in cells:
+            yield [float(values[i]) for (_, values), i in zip(self.axes, cell, strict=True)]
+
+
+GRIDS = "x=-0.3:0.3:21,y=-0.3:0.3:21,z=-0.7 or motors:NAME=-0.5:0.5:21,NAME=-0.5:0.5:21 (from:to:count)"
+
+
+def _parse_fixed_parts(single: Mapping[str, str], varied: Sequence[str], text: str) -> Pose:
+    """Return the parts of a grid that do not vary; roll, pitch and yaw that nobody gives are zero."""
+    parts = {name: value for name, value in single.items() if name not in TURNS}
+    if turned := sorted({*TURNS} & {*varied, *single}):
+        if other := {"phi", "rpy"} & {*varied, *single}:
+            raise BadRequest(f"grid: {', '.join(other)} and {', '.join(turned)} are given", text, "one kind of them")
+        parts["rpy"] = "/".join(single.get(name, "0") for name in TURNS)
+    elif {"phi", "rpy"} <= {*varied, *single}:
+        raise BadRequest("grid: both phi and rpy are given", text, "one of them")
+    return Pose.parse(",".join(map("=".join, parts.items()))) if parts else Pose()
 
 
 def compute_rpy(R: Array) -> tuple[float, float, float]:
@@ -447,33 +527,40 @@ def _write_number(value: float) -> str:
     return f"{round(value, 6) + 0.0:.15g}" if abs(value) >= 1 else f"{round(value, 9) + 0.0:.6g}"
 
 
-def _split_fields(text: str, what: str) -> list[tuple[str, str]]:
-    """Return name and value of each part, in order, each name once."""
+def _split_fields(text: str, what: str, known: Sequence[str] = PARTS) -> list[tuple[str, str]]:
+    """Return name and value of each part, in order, each name once; any name if none is ``known``."""
     found: list[tuple[str, str]] = []
     for part in text.split(","):
         name, equals, value = (piece.strip() for piece in part.partition("="))
         if not equals:
             raise BadRequest(f"{what}: not name=value", part.strip(), EXAMPLE)
-        if name not in PARTS:
-            raise BadRequest(f"{what}: unknown part", name, PARTS)
+        if known and name not in known:
+            raise BadRequest(f"{what}: unknown part", name, known)
         if name in dict(found):
             raise BadRequest(f"{what}: part given twice", name, "once")
         found.append((name, value))
     return found
 
 
+def _read_number(text: str, units: Sequence[str]) -> tuple[float, str]:
+    """Return a number (metres, radians) and the unit with which it is written, if any of ``units``; raises
+    ``ValueError``."""
+    unit = next((unit for unit in units if text.endswith(unit)), "")
+    number: float = parse_plain_number(text.removesuffix(unit).strip())
+    return UNITS[unit](number) if unit else number, unit
+
+
 def _parse_number(value: str, name: str, text: str) -> float:
-    digits = value.removesuffix("deg").strip() if name in ("phi", "rpy") else value
     try:
-        number: float = parse_plain_number(digits)
+        number, _ = _read_number(value, ("mm",) if name in LENGTHS else ("deg",) if name in ANGLES else tuple(UNITS))
     except ValueError:
-        unit = "a number of radians, or of degrees with deg" if name in ("phi", "rpy") else "a number of metres"
+        unit = "a number of radians, or of degrees with deg" if name in ANGLES else "a number of metres, or with mm"
         if ":" in value:
             unit += "; from:to:count is for grids"
         raise BadRequest(f"pose {text!r}: {name} is not a number", value, unit) from None
     if not math.isfinite(number):
         raise BadRequest(f"pose {text!r}: {name} is not finite", value, "a finite number")
-    return number if digits == value else math.radians(number)
+    return number
 
 
 def _parse_triple(value: str, text: str) -> Sequence[float]:

@@ -14,7 +14,6 @@ from ..analysis.configuration_report import CONSTRAINT, UNDECIDED
 from ..analysis.singularity.locus import Locus
 from ..errors import BadRequest
 from ..geometry.vectors import Array
-from ..mechanism.pose import PARTS
 from . import palette, plots
 from .figure_format import PNG, Paper, print_figure
 from .plots import (
@@ -24,6 +23,7 @@ from .plots import (
     format_ticks,
     in_style,
     label_curve,
+    label_joints,
     make_legend_entry,
     make_missing_entry,
     make_panels,
@@ -35,7 +35,7 @@ from .text.tables import encode_csv
 if TYPE_CHECKING:
     from ..analysis.accuracy.accuracy import Accuracy
     from ..analysis.accuracy.error_map import ErrorMap as ErrorField
-    from ..analysis.check import Check, GridCheck
+    from ..analysis.check import Check
     from ..analysis.observed import ObservedRobot
     from ..analysis.singularity.locus import SingularityMap
     from ..analysis.singularity.singularities import Singularity
@@ -83,14 +83,14 @@ def draw_distance_map(found: Check, paper: Paper = PNG) -> bytes:
             remedy="Choose another grid, or write a table (.csv).",
         )
     numbers = np.array([np.nan if value is None else value for value in grid.values("type2")]).reshape(grid.grid.shape)
-    states = np.array(grid.states).reshape(grid.grid.shape)
+    states, axes = np.array(grid.states).reshape(grid.grid.shape), label_joints(grid.grid, found.setup.robot)
     figure = (
-        _draw_distance_curve(grid, numbers, states, paper)
-        if grid.grid.ndim == 1
-        else _draw_distance_maps(grid, numbers, states, found.setup.motion, paper)
+        _draw_distance_curve(axes, numbers, states, paper)
+        if axes.ndim == 1
+        else _draw_distance_maps(axes, numbers, states, found.setup.motion, paper)
     )
     entries = [make_missing_entry()] if UNREACHABLE in grid.states else []
-    entries += _draw_robot(figure, grid.grid, found.setup)
+    entries += _draw_robot(figure, axes, found.setup)
     entries += [
         make_legend_entry(label, linestyle="", marker=mark, color=palette.get_colour("step4"), markeredgecolor="white")
         for state, (mark, label) in MARKS.items()
@@ -113,11 +113,11 @@ def _draw_robot(figure: Any, grid: Grid, setup: ObservedRobot) -> list[Any]:
 
 
 def _draw_distance_maps(
-    grid: GridCheck, numbers: Array, states: NDArray[np.str_], motion: PlatformMotion, paper: Paper
+    grid: Grid, numbers: Array, states: NDArray[np.str_], motion: PlatformMotion, paper: Paper
 ) -> Any:
     from matplotlib.colors import LogNorm
 
-    made = PoseMap.of(grid.grid, motion, paper)
+    made = PoseMap.of(grid, motion, paper)
     low, high, _ = _scale(numbers)
     norm = LogNorm(low, high)
     for (place, distances), (_, state) in zip(made.layers(numbers), made.layers(states), strict=True):
@@ -143,8 +143,8 @@ def _draw_distances(place: Any, plane: MapPlane, numbers: Array, states: NDArray
         )
 
 
-def _draw_distance_curve(grid: GridCheck, numbers: Array, states: NDArray[np.str_], paper: Paper) -> Any:
-    ((name, values),) = grid.grid.axes
+def _draw_distance_curve(grid: Grid, numbers: Array, states: NDArray[np.str_], paper: Paper) -> Any:
+    ((name, values),) = grid.axes
     x = convert_to_ticks(name, values)
     figure, (place,) = make_panels(1, 1, 7.0, 4.6, paper)
     low, high, ticks = _scale(numbers)
@@ -181,10 +181,11 @@ def check_table(found: Check) -> bytes:
     """Return comma-separated values: a line per pose (metres, radians), its state, and the values there."""
     assert found.grid is not None
     grid = found.grid
-    given = [name for name in PARTS if grid.grid.poses()[0].given.get(name)]
+    poses = grid.grid.requests_at(np.ndindex(grid.grid.shape))
+    given = [*poses[0].given]
     rows: list[list[Any]] = [[*given, "state", *MEASURES]]
     columns = [grid.values(measure) for measure in MEASURES]
-    for i, (pose, state) in enumerate(zip(grid.grid.poses(), grid.states, strict=True)):
+    for i, (pose, state) in enumerate(zip(poses, grid.states, strict=True)):
         values = ["/".join(map(repr, pose.given[name])) for name in given]
         rows.append([*values, state, *("" if column[i] is None else repr(column[i]) for column in columns)])
     return encode_csv(rows)
@@ -290,12 +291,13 @@ def draw_error_map(found: Accuracy, paper: Paper = PNG) -> bytes:
     shown = [(values, label) for values, label in shown if np.nanmax(values, initial=0.0) > 0]
     if not shown:
         raise BadRequest("there is nothing to draw: the platform has no error", remedy="Choose another robot or grid.")
+    axes = label_joints(field.grid, found.setup.robot)
     figure, locus = (
-        _draw_error_curves(field, shown, paper)
+        _draw_error_curves(field, axes, shown, paper)
         if field.grid.ndim == 1
-        else _draw_error_maps(field, shown, found.setup.motion, paper)
+        else _draw_error_maps(field, axes, shown, found.setup.motion, paper)
     )
-    plots.draw_legend(figure, _list_error_entries(field, locus) + _draw_robot(figure, field.grid, found.setup), paper)
+    plots.draw_legend(figure, _list_error_entries(field, locus) + _draw_robot(figure, axes, found.setup), paper)
     legs = ", ".join(f"{o.leg} {found.bounds.words(i, o)}" for i, o in enumerate(found.setup.observed))
     what = "observed legs" if all(o.is_segment_direction for o in found.setup.observed) else "observed"
     draw_heading(figure, f"{found.setup.robot.name}: largest errors\n{what}: {legs}", field.grid.fixed, "; ")
@@ -303,12 +305,12 @@ def draw_error_map(found: Accuracy, paper: Paper = PNG) -> bytes:
 
 
 def _draw_error_maps(
-    field: ErrorField, shown: list[tuple[Array, str]], motion: PlatformMotion, paper: Paper
+    field: ErrorField, grid: Grid, shown: list[tuple[Array, str]], motion: PlatformMotion, paper: Paper
 ) -> tuple[Any, bool]:
     """Return the figure, and whether a Type 2 singularity is in it."""
     from matplotlib.colors import LogNorm
 
-    made = PoseMap.of(field.grid, motion, paper, len(shown))
+    made = PoseMap.of(grid, motion, paper, len(shown))
     plane, flat, locus = made.plane, field.grid.ndim == 2, False
     for number, (values, label) in enumerate(shown):
         low, high = _choose_scale_ends(values)
@@ -361,8 +363,8 @@ def _draw_pieces(place: Any, plane: MapPlane, curve: Array, **style: Any) -> Non
     place.add_collection(LineCollection(list(np.stack(plane.at(curve[..., 0], curve[..., 1]), axis=-1)), **style))
 
 
-def _draw_error_curves(field: ErrorField, shown: list[tuple[Array, str]], paper: Paper) -> tuple[Any, bool]:
-    ((name, values),) = field.grid.axes
+def _draw_error_curves(field: ErrorField, grid: Grid, shown: list[tuple[Array, str]], paper: Paper) -> tuple[Any, bool]:
+    ((name, values),) = grid.axes
     x = convert_to_ticks(name, values)
     figure, axes = make_panels(len(shown), 1, 7.0, 3.0 * len(shown) + 1.2, paper)
     for place, (errors, label) in zip(axes, shown, strict=True):

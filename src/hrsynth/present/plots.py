@@ -15,7 +15,8 @@ from ..errors import MissingExtra
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import PlatformMotion
-from ..mechanism.pose import Pose
+from ..mechanism import Mechanism
+from ..mechanism.pose import ANGLES, Grid, JointPose, Pose
 from ..results import Result
 from .figure_format import BESIDE, PNG, Paper, draw_legend_within, print_figure
 from .skeleton import trace_leg_outlines, trace_link_outline
@@ -29,6 +30,8 @@ FIGURE_PADDING_INCHES_MIN = 0.07
 AXIS_TICKS_MIN = 3
 OWN_WIDTH, OWN_HEIGHT = 4.5, 3.5
 """A figure that an answer draws itself (inches)."""
+DEGREES = " (degrees)"
+"""End of the label of an angle."""
 PRINTED_DECIMALS_COUNT = 6
 """Decimals of metres and degrees in words."""
 Asked = ParamSpec("Asked")
@@ -90,8 +93,18 @@ def make_panels(
 
 
 def convert_to_ticks(name: str, values: Array) -> Array:
-    """The values of a part of a pose as they are drawn: angles in degrees."""
-    return np.degrees(values) if name == "phi" else values
+    """The values of a part of a pose, or of a joint by its label, as they are drawn: angles in degrees."""
+    return np.degrees(values) if name in ANGLES or name.endswith(DEGREES) else values
+
+
+def label_joints(grid: Grid, robot: Mechanism) -> Grid:
+    """Return a grid whose axes, if they are joints, have the labels with which they are drawn."""
+    if not grid.joints:
+        return grid
+    units = (DEGREES if unit == "rad" else f" ({unit})" for unit in grid.list_units(robot))
+    return replace(
+        grid, axes=tuple((name + unit, values) for (name, values), unit in zip(grid.axes, units, strict=True))
+    )
 
 
 def compute_cell_edges(values: Array) -> Array:
@@ -217,7 +230,7 @@ class MapPlane:
         if x is not None and y is not None:
             u, v = self.at(*np.meshgrid(x[[0, -1]], y[[0, -1]], indexing="ij"))
             place.set(xlim=(u.min(), u.max()), ylim=(v.min(), v.max()))
-        if "phi" not in self.names:
+        if set(self.names) <= set("xyz"):
             place.set_aspect("equal")
 
 
@@ -261,14 +274,16 @@ def label_curve(place: Any, name: str, x: Array, missing: Array, label: str, whi
     place.grid(which=which)
 
 
-def draw_heading(figure: Any, text: str, fixed: Pose, before: str = "\n") -> None:
+def draw_heading(figure: Any, text: str, fixed: Pose | JointPose, before: str = "\n") -> None:
     """Set the title, followed by the fixed coordinates, angles in degrees."""
     words = describe_pose(fixed)
     figure.suptitle(text + (f"{before}{words}" if words else ""))
 
 
-def describe_pose(pose: Pose) -> str:
+def describe_pose(pose: Pose | JointPose) -> str:
     """Format a pose with its units, angles in degrees."""
+    if isinstance(pose, JointPose):
+        return str(pose)
     told = Pose.parse(pose.shown) if pose.shown else pose
     return ", ".join(_describe_fixed_parts(name, values) for name, values in told.given.items())
 

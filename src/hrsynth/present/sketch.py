@@ -11,13 +11,16 @@ import numpy as np
 
 from ..analysis.freedoms import format_point
 from ..geometry.vectors import Array, find_perpendicular
+from ..mechanism.pose import ANGLES
 from ..results import Value
 from ..tolerances import DIRECTION_SINE_TOL
 
 
 def label_axis(name: str) -> str:
-    """Return the label of the axis of a pose coordinate."""
-    return "φ (degrees)" if name == "phi" else f"{name} (m)"
+    """Return the label of the axis of a pose coordinate, or of a joint's that has it (:func:`.plots.label_joints`)."""
+    if name.endswith(")"):
+        return name
+    return f"{'φ' if name == 'phi' else name} (degrees)" if name in ANGLES else f"{name} (m)"
 
 
 SKETCH_MARGIN_FRACTION = 0.06

@@ -155,7 +155,10 @@ def accuracy(
     ] = None,
     grid: Annotated[
         Grid | str | None,
-        option("A line, plane or box of poses, such as x=-0.3:0.3:21,y=0,z=-0.7 (from:to:count).", "GRID"),
+        option(
+            "A line, plane or box of poses, such as x=-0.3:0.3:21,y=0 (from:to:count) or motors:NAME=-0.5:0.5:21.",
+            "GRID",
+        ),
     ] = None,
     steps: Annotated[int | None, option("Poses along each side of the plane.", low=5, high=300)] = None,
     nonlinear: Annotated[

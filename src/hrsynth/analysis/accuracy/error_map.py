@@ -17,7 +17,7 @@ from ...errors import BadRequest, Disagreement, HrsynthError, NoReachablePose
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.velocity_relation import ObservationModel
-from ...mechanism.pose import GRID_CELLS_MAX, Grid, Pose
+from ...mechanism.pose import GRID_CELLS_MAX, Grid, JointPose, Pose
 from ...progress import report
 from ...records import DEG, FLAT, MM, As, Recorded, Table
 from ...results import Value
@@ -101,12 +101,12 @@ class ErrorMap(Value):
         """The smallest singular value of Mᵀ, in the grid's shape."""
         return self.seen.smallest().reshape(self.grid.shape)
 
-    def worst(self, count: int) -> list[Pose]:
+    def worst(self, count: int) -> list[Pose | JointPose]:
         """The poses of the largest finite position errors (orientation errors where there are no others)."""
         errors = self.position if np.nanmax(self.position, initial=0.0) > 0 else self.orientation
         flat = np.where(np.isfinite(errors), errors, -1.0).ravel()
         cells = [int(i) for i in np.argsort(-flat, kind="stable")[:count] if flat[i] > 0]
-        return list(self.grid.poses_at([tuple(map(int, np.unravel_index(i, self.grid.shape))) for i in cells]))
+        return list(self.grid.requests_at([tuple(map(int, np.unravel_index(i, self.grid.shape))) for i in cells]))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -148,13 +148,14 @@ class Mapper(Value):
         """The error maxima over a grid, by the batch ``checked`` at so many poses; raises ``NoReachablePose`` where no
         pose of it is reached, ``BadRequest`` where poses have to be found one by one and are too many for that."""
         name = self.setup.robot.name
-        if self.batch is None and grid.size > GRID_CELLS_MAX:
+        batch = None if grid.joints else self.batch
+        if batch is None and grid.size > GRID_CELLS_MAX:
             raise BadRequest(
                 f"{name}: the poses of this robot are solved one by one; number of poses",
                 grid.size,
                 f"at most {GRID_CELLS_MAX}",
             )
-        seen = self._one_by_one(grid) if self.batch is None else self._together(grid)
+        seen = self._one_by_one(grid) if batch is None else self._together(grid)
         dependent = (
             None
             if seen.reached.all()
@@ -163,7 +164,7 @@ class Mapper(Value):
         if not seen.reached.any():
             raise NoReachablePose(name, f"the grid {grid}", f"none of {grid.size} is", dependent)
         spots = smallest_at = None
-        if self.batch is not None:
+        if batch is not None:
             spots, smallest_at = self.spots(grid, seen, seed, checked), partial(self._smallest, grid)
         shape = grid.shape
         position, orientation = seen.position.reshape(shape), seen.orientation.reshape(shape)
@@ -248,6 +249,9 @@ class Mapper(Value):
                 rates, twists = compute_rates_and_twists(at, self.observation_model)
                 table[:4, i] = bound_pose_errors(at, self.observation_model, self.blur).ravel()
                 table[4, i] = _compute_smallest_change(rates, twists, at.model.length)
+        for row, moved in enumerate((self.setup.motion.translations, self.setup.motion.rotations)):
+            if not moved.shape[1]:
+                table[[row, row + 2]] = np.where(np.isnan(table[[row, row + 2]]), np.nan, 0.0)
         plane = PlaneOfPoses(self.observation_model, self.setup.motion, grid)
         return ErrorField(
             np.isfinite(table[4]),
@@ -256,7 +260,7 @@ class Mapper(Value):
             lambda: None,
             lambda: table[4],
             _compute_bound_gap(table[:2], table[2:4]),
-            partial(plane.curve, found) if grid.ndim == 2 else None,
+            partial(plane.curve, found) if grid.ndim == 2 and not grid.joints else None,
         )
 
     def spots(

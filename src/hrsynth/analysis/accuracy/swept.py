@@ -87,7 +87,7 @@ def sweep_to(path: str | Path, mapper: Mapper, grid: Grid, seed: int) -> SweptEr
         If no pose of the grid is reached.
     """
     name, target = mapper.setup.robot.name, require_file(path)
-    if mapper.batch is None:
+    if mapper.batch is None or grid.joints:
         raise BadRequest(
             f"{path}: the poses of {name} are solved one by one, not in parts", remedy="Write a table, such as map.csv."
         )

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations, product
-from typing import Annotated
+from typing import Annotated, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -343,7 +343,7 @@ def _find_isolated_poses(grid: Grid, starts: Sequence[ClosedConfiguration], meas
         at = descend(start, observation_model, measured.pattern, measured.condition)
         if at is None:
             continue
-        error, _ = motion.goal(grid.fixed).error_and_jacobian(at.model, at.q)
+        error, _ = motion.goal(cast(Pose, grid.fixed)).error_and_jacobian(at.model, at.q)
         place = _read_coordinates(motion, at, grid.names)
         new = all(np.linalg.norm(np.subtract(place, other)) > SINGULAR_POSE_DISTANCE_TOL for other in found)
         if new and np.linalg.norm(error) < ON_PLANE and _is_singular_in_same_mode(start, at, observation_model, motion):

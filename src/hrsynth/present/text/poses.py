@@ -15,7 +15,7 @@ from ...analysis.aspects.verdicts import UNDECIDED as UNDECIDED_PAIR
 from ...analysis.configuration_report import CONSTRAINT, REGULAR, UNDECIDED
 from ...constraints.condition import General
 from ...mechanism.pose import Pose
-from ...tolerances import INCIDENCE_TOL, RANK_GAP_MIN
+from ...tolerances import DIRECTION_SINE_TOL, INCIDENCE_TOL, RANK_GAP_MIN
 from .robots import NO_MATRIX, format_formation
 from .tables import (
     GAP,
@@ -33,6 +33,8 @@ from .tables import (
     format_listing,
     wrap_lines,
 )
+
+JOINTS_FOLLOW = "motors that are not given are at their zero, other joints follow the loops"
 
 if TYPE_CHECKING:
     from ...analysis.aspects.aspects import AspectTable, ModePair
@@ -82,7 +84,7 @@ def check(found: Check) -> str:
         counts = Counter(found.grid.states)
         axes = zip(found.grid.grid.shape, found.grid.grid.names, strict=True)
         size = " × ".join(f"{count} {name}" for count, name in axes)
-        fixed, free = str(found.grid.grid.fixed), ", ".join(_list_free_parts(found.grid))
+        fixed, free = found.grid.grid.fixed_text, ", ".join(_list_free_parts(found.grid))
         beyond = sum(bool(each.beyond_limits) for each in found.grid.postures if each is not None)
         rows.append(
             (
@@ -92,7 +94,11 @@ def check(found: Check) -> str:
                     *([found.grid.dependent] if found.grid.dependent else []),
                     *([f"{beyond} beyond joint limits"] if beyond else []),
                     *([f"fixed: {fixed}"] if fixed else []),
-                    f"free, chosen nearest to the zero configuration: {free}" if free else "no free coordinate",
+                    f"free, chosen nearest to the zero configuration: {free}"
+                    if free
+                    else JOINTS_FOLLOW
+                    if found.grid.grid.joints
+                    else "no free coordinate",
                 ],
             )
         )
@@ -146,6 +152,8 @@ def _format_configuration(posture: ConfigurationReport, length: float, setup: Ob
     shown = "directions" if all(each.is_segment_direction for each in setup.observed) else "observations"
     mobility, far, dof = posture.mobility, posture.distances, posture.dof
     turns = f", {posture.turns or 'none'} of which rotate{'s' * (posture.turns < 2)} it" if dof else ""
+    if setup.motion.has_one_rotation and abs(setup.motion.normal[2]) < 1 - DIRECTION_SINE_TOL:
+        turns += f", phi about {' '.join(f'{round(x, 6) + 0.0:.3g}' for x in setup.motion.normal)}"
     whose = f"bodies have {dof} dof" if setup.mechanism.formation else f"platform has {dof} dof{turns}"
     rows = [
         *format_joint_rows(posture.coordinates, posture.beyond_limits),

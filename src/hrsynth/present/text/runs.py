@@ -259,9 +259,9 @@ def _format_swept_rows(found: Accuracy, swept: SweptErrors) -> Rows:
 def describe_held(grid: Grid, setup: ObservedRobot, as_at_home: bool) -> str | None:
     """Describe the fixed coordinates of a grid: all that do not vary if free ones keep their values at the zero
     configuration (``as_at_home``), else those given and the names of the free ones."""
-    motion, typed = setup.motion, str(grid.fixed)
+    motion, typed = setup.motion, grid.fixed_text
     if not as_at_home:
-        free = ", ".join(motion.free({*grid.names, *grid.fixed.given}))
+        free = "" if grid.joints else ", ".join(motion.free(grid.parts))
         return (
             (typed or None)
             if not free
@@ -270,7 +270,7 @@ def describe_held(grid: Grid, setup: ObservedRobot, as_at_home: bool) -> str | N
     ends, _ = list_grid_poses(motion, grid, setup.robot.name, grid.places_at(np.array([0, grid.size - 1])))
     first, last = (dict(part.split("=") for part in str(motion.pose(X)).split(",")) for X in ends)
     given = dict(part.split("=") for part in typed.split(",") if part)
-    turned = {"phi", "rpy"} & {*grid.names, *given}
+    turned = {"phi", "rpy"} & grid.parts
     return (
         ",".join(
             f"{name}={given.get(name, value)}"
@@ -287,7 +287,8 @@ def _format_grid_rows(
 ) -> Rows:
     size = " × ".join(f"{count} {name}" for count, name in zip(grid.shape, grid.names, strict=True))
     ranges = ", ".join(
-        f"{name} {values[0]:.4g} to {values[-1]:.4g} {'rad' if name == 'phi' else 'm'}" for name, values in grid.axes
+        f"{name} {values[0]:.4g} to {values[-1]:.4g} {unit}"
+        for (name, values), unit in zip(grid.axes, grid.list_units(found.setup.robot), strict=True)
     )
     rows = [
         ("poses", f"{size}: {ranges}"),

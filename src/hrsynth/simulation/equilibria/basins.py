@@ -26,7 +26,7 @@ from ...geometry.so3 import turn_about
 from ...geometry.vectors import Array, compare_poses
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
-from ...mechanism.pose import Grid, Pose, PoseLike, convert_to_pose, parse_pose
+from ...mechanism.pose import SCALARS, Grid, Pose, PoseLike, convert_to_pose, parse_pose
 from ...options import option
 from ...processes import run_shared
 from ...progress import report
@@ -282,7 +282,10 @@ def basins(
     (target,) = solve_configurations(setup, [asked])
     task = ServoTask.between(setup, target, target, Conditions(depth=depth))
     search = BasinSearch(setup, target, task, jobs or os.cpu_count() or 1)
-    return search.over(search.plane(plane, steps) if grid is None else Grid.parse(grid, FLOW_STARTS), seed)
+    starts = search.plane(plane, steps) if grid is None else Grid.parse(grid, FLOW_STARTS)
+    if not {*starts.names} <= {*SCALARS}:
+        raise BadRequest(f"--grid {grid}: parts of the starts that vary", starts.names, SCALARS)
+    return search.over(starts, seed)
 
 
 @dataclass(frozen=True, eq=False)
