@@ -84,7 +84,7 @@ def executed(script: Path, folder: Path = EXECUTED) -> Any:
         coalesce_streams=True,
         kernel_name="python3",
         resources={"metadata": {"path": str(folder)}},
-    ).execute()
+    ).execute(env={**os.environ, "HRSYNTH_PROGRESS": "0"})
     for old in folder.glob(f"{script.stem}.*.ipynb"):
         old.unlink(missing_ok=True)
     fresh = file.with_suffix(f".{os.getpid()}")

@@ -1,10 +1,19 @@
-"""Progress through a context variable: :func:`report` emits a stage, :func:`on_progress` subscribes."""
+"""Progress through a context variable: :func:`report` emits a stage, :func:`on_progress` subscribes. An analysis that
+nobody listens to shows itself on a terminal and in Jupyter; the logger ``hrsynth`` has each step at level DEBUG."""
 
 from __future__ import annotations
 
+import os
+import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+
+SHOWN_AFTER_S, SHOWN_AGAIN_S = 2.0, 0.5
+"""Seconds before an analysis in Python shows its progress, and between two updates."""
+SHOWN_COLUMNS = 78
+"""Width of that line."""
 
 _listener: ContextVar[Callable[[str], None] | None] = ContextVar("listener", default=None)
 _part: ContextVar[str] = ContextVar("part", default="")
@@ -12,9 +21,11 @@ _part: ContextVar[str] = ContextVar("part", default="")
 
 def report(stage: str) -> None:
     """Report one more step of a stage of the running analysis."""
-    listener = _listener.get()
+    listener, text = _listener.get(), _part.get() + stage
     if listener is not None:
-        listener(_part.get() + stage)
+        listener(text)
+    if (logging := sys.modules.get("logging")) is not None:  # who listens has loaded it
+        logging.getLogger("hrsynth").debug(text)
 
 
 @contextmanager
@@ -25,6 +36,33 @@ def report_part(name: str) -> Iterator[None]:
         yield
     finally:
         _part.reset(token)
+
+
+@contextmanager
+def show_progress() -> Iterator[None]:
+    """Show the stages reported within in one line on a terminal or in Jupyter, unless somebody listens already or
+    ``HRSYNTH_PROGRESS=0``."""
+    is_watched = sys.stderr.isatty() or "ipykernel" in sys.modules
+    if _listener.get() is not None or not is_watched or os.environ.get("HRSYNTH_PROGRESS") == "0":
+        yield
+        return
+    began = written = time.monotonic()
+    steps, is_shown = 0, False
+
+    def show(stage: str) -> None:
+        nonlocal steps, written, is_shown
+        steps, now = steps + 1, time.monotonic()
+        if now - began > SHOWN_AFTER_S and now - written > SHOWN_AGAIN_S:
+            written, is_shown = now, True
+            line = f"{stage}, step {steps}, {now - began:.0f} s"[:SHOWN_COLUMNS]
+            print(f"\r{line:{SHOWN_COLUMNS}}", end="", file=sys.stderr, flush=True)
+
+    try:
+        with on_progress(show):
+            yield
+    finally:
+        if is_shown:
+            print(f"\r{'':{SHOWN_COLUMNS}}\r", end="", file=sys.stderr, flush=True)
 
 
 @contextmanager
@@ -43,7 +81,9 @@ def on_progress(listener: Callable[[str], None]) -> Iterator[None]:
 
     Notes
     -----
-    The listener belongs to the context: other threads do not report to it.
+    The listener belongs to the context: other threads do not report to it. Without a listener an analysis of more than
+    two seconds shows a line on a terminal and in Jupyter (not if the environment has ``HRSYNTH_PROGRESS=0``), and the
+    logger ``hrsynth`` has every step at level ``DEBUG``.
 
     Examples
     --------

@@ -8,6 +8,7 @@ from functools import wraps
 from typing import Any, ParamSpec, TypeVar
 
 from ..options import Option, list_options, strip_annotations
+from ..progress import show_progress
 from .arguments import ArgumentBinder
 from .result_cache import compute_cached
 
@@ -44,7 +45,8 @@ def analysis(
 
         @wraps(function)
         def asked(*args: Any, **given: Any) -> Any:
-            return compute_cached(function, binder.bind(args, given))
+            with show_progress():
+                return compute_cached(function, binder.bind(args, given))
 
         asked.__signature__ = strip_annotations(function)  # type: ignore[attr-defined]
         asked.declaration = Declaration(  # type: ignore[attr-defined]
