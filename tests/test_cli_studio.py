@@ -16,6 +16,8 @@ from pathlib import Path
 import pytest
 
 from hrsynth.cli import run_command
+from hrsynth.cli.options import SOURCE
+from hrsynth.present.studio.request import OPTIONS
 from present.studio_client import alive, soon
 
 pytest.importorskip("uvicorn")
@@ -93,12 +95,20 @@ def test_a_file_that_is_no_robot_file_is_refused(tmp_path: Path, capfd: pytest.C
         (["3rrr_m1", "another"], "another"),
         (["3rrr_m1", "--observe", "1,,2"], "empty name"),
         (["/dev/null"], "not a regular file"),
+        (["quattro", "--platform", "nobody"], "nobody"),
+        (["quattro", "--base", "nobody"], "nobody"),
+        (["--platform", "rod_1a"], "without a file: got .*platform"),
+        ([str(Path(__file__).parent), "--arg", "a:=1"], "without a file: got .*args"),
     ],
 )
 def test_what_cannot_be_done_is_refused_in_one_line(capfd, arguments: list[str], words: str):
     status, out, err = ask(capfd, *arguments)
     assert (status, out) == (2, "")
     assert re.fullmatch(rf"hrsynth: .*{words}.*\n", err)
+
+
+def test_the_page_takes_each_override_of_the_command_line():
+    assert {option.name for option in SOURCE} - {"robot"} == {*OPTIONS}
 
 
 def test_a_port_that_is_taken_is_an_error_not_another_port(capfd: pytest.CaptureFixture[str]):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..options import OBSERVATION, Option
 from .colour import print_text
 from .commands import Group, add_command
-from .options import list_shipped_names, split_names
+from .options import SOURCE, list_shipped_names, split_names
 
 if TYPE_CHECKING:
     from ..present.studio.server import StudioServer
@@ -17,12 +17,14 @@ if TYPE_CHECKING:
 PORT = Option("port", "Port of the server (default: any free one).", None, int, 0, low=0, high=65535)
 
 
-def studio(robot: str | None, observe: str | None, camera: str | None, port: int, browser: bool) -> None:
+def studio(
+    robot: str | None, observe: str | None, camera: str | None, port: int, browser: bool, **overrides: Any
+) -> None:
     """Serve the page until Ctrl-C."""
-    from ..present.studio.server import studio as started
+    from ..present.studio.server import start_studio
 
     watched = None if observe is None else split_names(observe)
-    serve(started(robot, watched, camera, port=port, open_=browser), "The studio")
+    serve(start_studio(robot, watched, camera, overrides, port, browser), "The studio")
 
 
 def serve(server: StudioServer, what: str) -> None:
@@ -63,6 +65,7 @@ def add(app: Group) -> None:
             Option("camera", "The link that carries the camera.", "LINK", group=OBSERVATION),
             PORT,
             Option("browser", "Open the page in the browser.", None, bool, True, ("--browser/--no-browser",)),
+            *SOURCE[1:],
         ),
         studio,
         ("quattro --observe 1,4", "robots/ --port 8000 --no-browser"),

@@ -10,7 +10,7 @@ import tempfile
 import threading
 import time
 import webbrowser
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from http import HTTPStatus
 from importlib.util import find_spec
@@ -97,13 +97,31 @@ def studio(
     >>> server = hrsynth.studio("3rrr_m1", open_=False)
     >>> server.stop()
     """
-    from ...description import find_robot_file
+    return start_studio(robot, observe, camera, {}, port, open_)
+
+
+def start_studio(
+    robot: str | Path | Mechanism | None,
+    observe: Iterable[str | int] | str | None,
+    camera: str | None,
+    overrides: dict[str, Any],
+    port: int,
+    open_: bool,
+) -> StudioServer:
+    """Serve the studio as :func:`studio`, of a file with ``overrides`` as on the command line."""
+    from ...description import find_robot_file, load
     from ...description.overrides import parse_names
     from ...description.reading import open_robot_file
     from ...mechanism import Mechanism
 
     watched = parse_names(observe if observe is None or isinstance(observe, str) else map(str, observe))
     first = {"camera": camera, "watch": None if watched in (None, ("all",)) else list(watched)}
+    options = _list_overrides(overrides)
+    if options and (robot is None or os.path.isdir(str(robot))):
+        raise BadRequest("options of a robot file without a file", list(options), remedy="Name the file.")
+    if options and not isinstance(robot, Mechanism):
+        read = load(robot, **options)
+        robot = read if "/" in options.get("keyframe", "") else robot  # the page names no other files
     if robot is None:
         here = StartupState()
     elif isinstance(robot, Mechanism):
@@ -112,8 +130,9 @@ def studio(
     elif os.path.isdir(robot):
         here = StartupState(folder=Path(robot))
     else:
-        open_robot_file(find_robot_file(robot))
-        here = StartupState(given={"robot": str(robot), "options": {}}, first=first)
+        if not options:
+            open_robot_file(find_robot_file(robot))
+        here = StartupState(given={"robot": str(robot), "options": options}, first=first)
     server = StudioServer(here, port)
     if open_:
         server.show()
@@ -123,8 +142,6 @@ def studio(
 def serve_view(found: View, port: int = 0, open_: bool = True, source: dict[str, Any] | None = None) -> StudioServer:
     """Serve the page of a view, without panels; ``source``: the robot and its options on the command line. Raises as
     :func:`studio`."""
-    from ...description.overrides import parse_names
-
     if not all(seen.is_segment_direction for seen in found.setup.observed):
         raise BadRequest(
             "--sensor: a served view shows directions of segments only",
@@ -135,13 +152,7 @@ def serve_view(found: View, port: int = 0, open_: bool = True, source: dict[str,
     if source is None or "/" in (source["keyframe"] or ""):  # the page names no files
         given = _describe_source(robot)
     else:
-        lists = {"motors": parse_names(source["motors"]), "freeze": parse_names(source["freeze"] or None)}
-        options = {
-            name: value
-            for name, value in {**source, **lists}.items()
-            if name != "robot" and value not in (None, "", []) and value is not False
-        }
-        given = {"robot": source["robot"], "options": options}
+        given = {"robot": source["robot"], "options": _list_overrides(source)}
     first = {
         "watch": [seen.link for seen in found.setup.observed],
         "camera": found.setup.robot.camera,
@@ -153,6 +164,18 @@ def serve_view(found: View, port: int = 0, open_: bool = True, source: dict[str,
     if open_:
         server.show()
     return server
+
+
+def _list_overrides(source: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the overrides of a file that are given on the command line, as ``load`` takes them."""
+    from ...description.overrides import parse_names
+
+    lists = {name: parse_names(source.get(name) or None) for name in ("motors", "freeze")}
+    return {
+        name: value
+        for name, value in {**source, **lists}.items()
+        if name != "robot" and value not in (None, "", []) and value is not False
+    }
 
 
 def _describe_source(robot: Mechanism) -> dict[str, Any] | None:
