@@ -17,7 +17,7 @@ from hrsynth.cli import run_command
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "docs"))
-PAGES = sorted((ROOT / "docs" / "pages").glob("*.md"))
+PAGES = sorted((ROOT / "docs" / "pages").rglob("*.md"))
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.name)

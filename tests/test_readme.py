@@ -142,14 +142,26 @@ def test_the_commands_print_what_is_shown(
     """Line by line, with its numbers; a page can omit lines."""
     monkeypatch.chdir(tmp_path)
     assert run_command(shlex.split(command)) == 0
-    printed = capsys.readouterr().out.splitlines()
+    printed = capsys.readouterr().out
     for shown in re.findall(re.escape(f"$ hrsynth {command}\n") + r"(.*?)\n(?:```|\n?\$ )", SHOWN, re.DOTALL):
-        missing = [
-            line
-            for line in shown.splitlines()
-            if line.strip() not in ("", "…") and not any(_alike(line, other) for other in printed)
-        ]
-        assert missing == []
+        assert _list_missing(shown, printed) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", sorted((PAGES / "machines").glob("*.md")), ids=lambda page: page.stem)
+def test_the_page_of_a_machine_runs_as_it_is_shown(
+    page: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Its program and its commands in order, in one folder; a shown error is the exit status 3."""
+    monkeypatch.chdir(tmp_path)
+    text = page.read_text(encoding="utf-8")
+    for code in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
+        exec(compile(code, page.name, "exec"), {})
+    runs = re.findall(r"^\$ hrsynth (.*)\n((?:(?!\$ |```).*\n)+)", text, re.MULTILINE)
+    assert len(runs) == text.count("$ hrsynth ") > 5
+    for command, shown in runs:
+        assert run_command(shlex.split(command)) == (3 if shown.startswith("hrsynth: ") else 0), command
+        assert _list_missing(shown, "".join(capsys.readouterr())) == [], command
 
 
 @pytest.mark.parametrize(
@@ -169,6 +181,12 @@ def test_the_commands_print_what_is_shown(
 )
 def test_lines_are_compared_with_their_numbers(shown: str, printed: str, same: bool):
     assert _alike(shown, printed) is same
+
+
+def _list_missing(shown: str, printed: str) -> list[str]:
+    """Return the shown lines that are not printed."""
+    lines = [line for line in shown.splitlines() if line.strip() not in ("", "…")]
+    return [line for line in lines if not any(_alike(line, other) for other in printed.splitlines())]
 
 
 def _alike(shown: str, printed: str) -> bool:

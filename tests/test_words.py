@@ -159,7 +159,7 @@ def plain_text(page: str) -> str:
     return re.sub(r"`[^`]*`", "code", page)
 
 
-WRITTEN = sorted({*PAGES.glob("*.md")} - {PAGES / name for name in GENERATED}) + [ROOT / "README.md"]
+WRITTEN = sorted({*PAGES.rglob("*.md")} - {PAGES / name for name in GENERATED}) + [ROOT / "README.md"]
 
 
 @pytest.mark.parametrize("path", WRITTEN, ids=lambda path: path.name)
