@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import shlex
 from copy import deepcopy
+from functools import wraps
 from pathlib import Path
+from typing import Any
 
 import pytest
 from jsonschema import Draft202012Validator
@@ -13,6 +15,9 @@ from jsonschema import Draft202012Validator
 import hrsynth
 from hrsynth.cli import run_command
 from hrsynth.cli.schema import build_schema, format_schema_page, list_json_commands
+from hrsynth.index import list_analyses
+from hrsynth.present.outputs import list_file_fields
+from hrsynth.results import Result
 
 QUICK = {
     "derive": [
@@ -101,6 +106,25 @@ def test_every_answer_is_what_its_schema_says(here: Path, capsys, command: str):
         record = answered(capsys, f"{command} {arguments}")
         assert (record["command"], record["version"]) == (command, hrsynth.__version__)
         assert wrong(command, record) == [], arguments
+
+
+@pytest.mark.some(4)
+@pytest.mark.parametrize("command", [*list_analyses(), "lint"])
+def test_the_json_of_a_result_is_that_of_its_command(here: Path, capsys, command: str, monkeypatch: pytest.MonkeyPatch):
+    """Of every command whose files are not written."""
+    found: list[Result] = []
+    answer = getattr(hrsynth, command)
+
+    @wraps(answer)
+    def kept(*args: Any, **given: Any) -> Result:
+        found.append(answer(*args, **given))
+        return found[-1]
+
+    monkeypatch.setattr(hrsynth, command, kept)
+    for arguments in QUICK[command]:
+        record = answered(capsys, f"{command} {arguments}")
+        record |= dict.fromkeys(each for each in list_file_fields(command) if isinstance(record[each], str))
+        assert found[-1].to_json() == json.dumps(record, ensure_ascii=False, indent=2)
 
 
 def test_every_command_with_json_is_tried():

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass, replace
 from functools import cache
+from importlib.util import find_spec
 from itertools import islice
 from pathlib import Path
 
@@ -17,6 +18,7 @@ import pytest
 
 import hrsynth
 from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.errors import MissingExtra
 from hrsynth.mechanism.model import PlatformChoice
 from hrsynth.results import Result
 
@@ -116,6 +118,20 @@ def test_what_was_loaded_goes_on_working():
     for name in ("modes planar", "servo", "accuracy"):
         found = asked(name)
         assert hrsynth.draw(pickle.loads(pickle.dumps(found))).content == hrsynth.draw(found).content, name
+
+
+def test_results_are_tables_of_pandas():
+    """Of a grid the table that is written, else one row; without pandas a line with a remedy."""
+    found = hrsynth.check("rrrrr_m1", grid="x=0:0.02:2,y=0.2:0.22:3")
+    if find_spec("pandas") is None:
+        with pytest.raises(MissingExtra, match=r"a table of pandas needs .*pip install pandas\."):
+            found.to_pandas()
+        pytest.skip("pandas is not here")
+    table = found.to_pandas()
+    assert table.shape[0] == 6
+    np.testing.assert_allclose(table[["x", "y"]], [(x, y) for x in (0, 0.02) for y in (0.2, 0.21, 0.22)])
+    legs = hrsynth.legs("rrrrr_m1")
+    assert legs.to_pandas().iloc[0].to_dict() == legs.to_row()
 
 
 def test_arrays_stay_read_only():

@@ -29,6 +29,8 @@ from .mechanism.builder import build as build
 from .present.show import draw as draw
 from .present.show import html as html
 from .present.show import text as text
+from .present.show import to_json as to_json
+from .present.show import to_pandas as to_pandas
 from .present.studio.server import studio as studio
 from .present.view.view import view as view
 from .progress import on_progress as on_progress
@@ -71,7 +73,9 @@ __all__ = [
     "singularities",
     "studio",
     "text",
+    "to_json",
     "to_mujoco",
+    "to_pandas",
     "to_pinocchio",
     "to_urdf",
     "verify",

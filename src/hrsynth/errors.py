@@ -413,15 +413,16 @@ class InvalidCertificate(NoResult):
 
 
 class MissingExtra(NoResult):
-    """Optional package that is not installed: what needs it, and the extra that installs it."""
+    """Optional package that is not installed: what needs it, and the extra (or ``package``) that installs it."""
 
     met: ClassVar[int] = 0
     """Number of these errors so far; results computed without an optional package are not cached."""
 
-    def __init__(self, what: str, extra: str) -> None:
+    def __init__(self, what: str, extra: str, *, package: bool = False) -> None:
         self.what, self.extra = what, extra
         install = f"{sys.executable or 'python'} -m pip install"
         remedy = f'Run {install} "hrsynth[{extra}]", or in a checkout {install} ".[{extra}]".'
+        remedy = f"Run {install} {extra}." if package else remedy
         self.reason = compose_message(f"{what} needs an optional package", None, None, remedy)
         MissingExtra.met += 1
         super().__init__(self.reason)

@@ -27,7 +27,7 @@ HELPERS = {
     "kinematics.pinocchio_export": ("to_pinocchio",),
     "linting.lint": ("lint",),
     "mechanism.builder": ("build",),
-    "present.show": ("draw", "html", "text"),
+    "present.show": ("draw", "html", "text", "to_json", "to_pandas"),
     "present.studio.server": ("studio",),
     "progress": ("on_progress",),
 }

@@ -110,6 +110,11 @@ class Result(ComparableValue):
         if shown_as is not None:
             cls.shown_as = shown_as
 
+    @property
+    def command(self) -> str:
+        """Command that prints the result; of a part of a result its kind."""
+        return self.shown_as
+
     def headline(self) -> str:
         """Return the result in one line."""
         raise NotImplementedError
@@ -124,6 +129,14 @@ class Result(ComparableValue):
     def rows(self) -> Iterable[Iterable[Any]]:
         """Return the rows of the result, headings first, unless ``present/outputs.py`` defines them."""
         return ()
+
+    def to_json(self) -> str:
+        """Return the JSON that the command prints with ``--json``."""
+        return str(Result.public("to_json")(self))
+
+    def to_pandas(self) -> Any:
+        """Return the result as ``hrsynth.to_pandas`` does, a ``pandas.DataFrame``."""
+        return Result.public("to_pandas")(self)
 
     @staticmethod
     def answer_of(name: str) -> type[Result]:

@@ -3,9 +3,9 @@ of the file's tree, and against MuJoCo, which reads what this project writes for
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
+import warnings
+from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -14,6 +14,7 @@ import pytest
 import hrsynth
 from description.foreign.test_models import FIGURES, MODELS, model
 from hrsynth.description.contents import Inertial, collect_content, write_fragments
+from hrsynth.description.formats.mjcf.write import BODY_MASS_MIN
 from hrsynth.geometry.so3 import convert_rotations_to_vectors
 from hrsynth.geometry.vectors import Array, build_pose
 from hrsynth.kinematics.configuration import ClosedConfiguration
@@ -53,8 +54,7 @@ class Pinned:
     def __init__(self, export: PinocchioExport) -> None:
         self.export, self.model = export, export.model
         self.data = self.model.createData()
-        self.own = pin.StdVec_RigidConstraintData()
-        self.own.extend([each.createData() for each in export.constraint_models])
+        self.own = [each.createData() for each in export.constraint_models]
         self.links = {each.name: i for i, each in enumerate(self.model.frames) if each.type == pin.FrameType.BODY}
 
     def constraints(self, q: Array) -> tuple[Array, Array]:
@@ -212,25 +212,6 @@ def test_gears_are_rows():
     np.testing.assert_array_equal(robot.to_pinocchio().couplings, [[-0.3, 1.0]])
 
 
-@pytest.mark.some(2)
-@pytest.mark.parametrize("name", ROBOTS)
-def test_forward_dynamics_are_those_of_the_free_motions(name: str):
-    """With the small armature that bodies without a mass need."""
-    pinned = Pinned(weighed(hrsynth.load(name)).to_pinocchio())
-    model, data, q, still = pinned.model, pinned.data, pinned.export.q0, np.zeros(pinned.model.nv)
-    model.gravity.linear, model.armature = GRAVITY, np.full(model.nv, 1e-9)
-    Z = kernel(pinned.constraints(q)[1])
-    M = np.triu(pin.crba(model, data, q, pin.Convention.WORLD))
-    M = Z.T @ (M + np.triu(M, 1).T) @ Z
-    free = Z @ np.linalg.solve(M, -Z.T @ pin.computeGeneralizedGravity(model, data, q))
-    loops = pin.StdVec_RigidConstraintModel()
-    loops.extend(pinned.export.constraint_models)
-    pin.initConstraintDynamics(model, data, loops, pinned.own)
-    settings = pin.ProximalSettings(1e-12, 1e-10, 50)
-    found = pin.constraintDynamics(model, data, q, still, still, loops, pinned.own, settings)
-    np.testing.assert_allclose(found, free, atol=1e-4 * np.abs(free).max())
-
-
 def weighed(robot: Mechanism, seed: int = 0) -> Mechanism:
     """The robot with random masses of links that have none, and random inertias where no body can have the file's,
     which are not written for MuJoCo."""
@@ -249,21 +230,18 @@ def weighed(robot: Mechanism, seed: int = 0) -> Mechanism:
 
 
 class Simulated:
-    """The same robot in MuJoCo, without limits and shapes, its bodies without a mass all but so."""
+    """The same robot in MuJoCo, without limits and contacts, its bodies without a mass all but so."""
 
-    def __init__(self, robot: Mechanism, folder: Path) -> None:
+    def __init__(self, robot: Mechanism) -> None:
         self.mujoco = mujoco = pytest.importorskip("mujoco")
-        file = folder / "robot.xml"
-        hrsynth.save(robot, file)
-        root = ET.parse(file).getroot()
-        root.find("compiler").attrib.update(boundmass="1e-12", boundinertia="1e-12")
-        for each in list(root.iter()):
-            each.attrib.pop("range", None)
-            for child in (*each.findall("geom"), *each.findall("asset")):
-                each.remove(child)
-        ET.SubElement(root, "option", jacobian="dense")
-        self.model = mujoco.MjModel.from_xml_string(ET.tostring(root, encoding="unicode"))
-        self.data = mujoco.MjData(self.model)
+        with warnings.catch_warnings(action="ignore", category=UserWarning):
+            self.model = model = robot.to_mujoco()
+        light = model.body_mass == BODY_MASS_MIN
+        model.body_mass[light], model.body_inertia[light] = 1e-12, 1e-12
+        model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+        model.opt.disableflags = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT
+        self.data = mujoco.MjData(model)
+        mujoco.mj_setConst(model, self.data)
 
     def constraints(self) -> tuple[Array, Array]:
         """What the loops and gears miss, and the derivative of that, where MuJoCo is."""
@@ -291,32 +269,61 @@ class Simulated:
                 break
         self.constraints()
 
+    def inertia(self) -> Array:
+        """The matrix of inertia where MuJoCo is, (nv, nv)."""
+        M = np.zeros((self.model.nv,) * 2)
+        self.mujoco.mj_fullM(self.model, self.data, M)
+        return M
 
-def differences(robot: Mechanism, folder: Path) -> tuple[float, float, bool]:
-    """At some closed configurations the largest difference of gravity's loads on the motions of links that the loops
-    allow, and of the torques by which motors hold the robot (N, Nm); that of the inertia that these motions meet (to
-    the largest); whether motors were compared: where no motor is told by the others."""
-    robot_model, pinned, other = PinocchioModel(robot), Pinned(robot.to_pinocchio()), Simulated(robot, folder)
-    model, data, names = pinned.model, pinned.data, pinned.export.motors
-    model.gravity.linear, other.model.opt.gravity = GRAVITY, GRAVITY
+    def accelerate(self, Y: Array, v: Array, force: Array) -> Array:
+        """The accelerations at which the loops stay closed (Y: a basis of the motions that they allow), by Lagrange's
+        equations, with differences of fourth order for the derivative of the constraints."""
+        start, step = self.data.qpos.copy(), 1e-3
+
+        def shifted(time: float) -> Array:
+            self.data.qpos[:] = start
+            self.mujoco.mj_integratePos(self.model, self.data.qpos, v, time)
+            return self.constraints()[1]
+
+        near, far = (shifted(n * step) - shifted(-n * step) for n in (1, 2))
+        self.data.qpos[:], self.data.qvel[:] = start, v
+        forced = np.linalg.lstsq(self.constraints()[1], -(8 * near - far) @ v / (12 * step))[0]
+        M, bias = self.inertia(), self.data.qfrc_bias.copy()
+        self.data.qvel[:] = 0
+        return forced + Y @ np.linalg.solve(Y.T @ M @ Y, Y.T @ (force - bias - M @ forced))
+
+
+def walk_in_both(robot: Mechanism, pinned: Pinned, other: Simulated) -> Iterator[tuple[Array, Array, Array]]:
+    """At some closed configurations the coordinates, and in both models bases of the same motions of links that
+    the loops allow."""
+    pinned.model.gravity.linear, other.model.opt.gravity = GRAVITY, GRAVITY
+    model = PinocchioModel(robot)
     links = [link for link in robot.links if link != robot.base]
-    driven = [model.joints[model.getJointId(name)].idx_v for name in names]
-    acted = [other.model.joint(name).dofadr[0] for name in names]
-    q, start = pinned.export.q0, ClosedConfiguration.of(robot_model, robot_model.q0)
-    torques, inertias, held = 0.0, 0.0, False
+    q, start = pinned.export.q0, ClosedConfiguration.of(model, model.q0)
     for at in (start, *walk_randomly(start, 3, steps=3)):
         poses = {link: at.pose(link) for link in robot.links}
         q = pinned.reach(q, poses)
         other.reach(poses)
         Z, Y = kernel(pinned.constraints(q)[1]), kernel(other.constraints()[1])
         V, W = pinned.twists(q, links), other.twists(links)
-        basis = np.linalg.svd(V @ Z, full_matrices=False)[0]  # the same motions of links for both
+        basis = np.linalg.svd(V @ Z, full_matrices=False)[0]
         Z, Y = Z @ np.linalg.lstsq(V @ Z, basis)[0], Y @ np.linalg.lstsq(W @ Y, basis)[0]
-        assert Z.shape == (model.nv, at.kernel()[0].shape[1])
+        assert Z.shape == (pinned.model.nv, at.kernel()[0].shape[1])
         np.testing.assert_allclose(W @ Y, basis, atol=1e-7)
-        M, N = np.triu(pin.crba(model, data, q, pin.Convention.WORLD)), np.zeros((other.model.nv,) * 2)
-        other.mujoco.mj_fullM(other.model, other.data, N)
-        M, N = Z.T @ (M + np.triu(M, 1).T) @ Z, Y.T @ N @ Y
+        yield q, Z, Y
+
+
+def differences(robot: Mechanism) -> tuple[float, float, bool]:
+    """At some closed configurations the largest difference of gravity's loads on the motions of links that the loops
+    allow, and of the torques by which motors hold the robot (N, Nm); that of the inertia that these motions meet (to
+    the largest); whether motors were compared: where no motor is told by the others."""
+    pinned, other = Pinned(robot.to_pinocchio()), Simulated(robot)
+    model, data = pinned.model, pinned.data
+    driven, acted = list_motors(pinned, other)
+    torques, inertias, held = 0.0, 0.0, False
+    for q, Z, Y in walk_in_both(robot, pinned, other):
+        M = np.triu(pin.crba(model, data, q, pin.Convention.WORLD))
+        M, N = Z.T @ (M + np.triu(M, 1).T) @ Z, Y.T @ other.inertia() @ Y
         inertias = max(inertias, np.abs(M - N).max() / np.abs(N).max())
         load, theirs = Z.T @ pin.computeGeneralizedGravity(model, data, q), Y.T @ other.data.qfrc_bias
         torques = max(torques, np.abs(load - theirs).max())
@@ -327,9 +334,55 @@ def differences(robot: Mechanism, folder: Path) -> tuple[float, float, bool]:
     return torques, inertias, held
 
 
+def list_motors(pinned: Pinned, other: Simulated) -> tuple[list[int], list[int]]:
+    """The rates of the motors in both models."""
+    names = pinned.export.motors
+    driven = [pinned.model.joints[pinned.model.getJointId(name)].idx_v for name in names]
+    return driven, [other.model.joint(name).dofadr[0] for name in names]
+
+
 @pytest.mark.some(4)
 @pytest.mark.parametrize("name", [*ROBOTS, *FIGURES])
-def test_motors_carry_what_they_carry_in_mujoco(name: str, tmp_path: Path):
-    torques, inertias, _ = differences(weighed(robot_named(name)), tmp_path)
+def test_motors_carry_what_they_carry_in_mujoco(name: str):
+    torques, inertias, _ = differences(weighed(robot_named(name)))
     assert torques < TORQUES
     assert inertias < TORQUES
+
+
+@pytest.mark.some(5)
+@pytest.mark.parametrize("name", [*ROBOTS, *FIGURES])
+def test_robots_accelerate_as_in_mujoco(name: str):
+    """In motion and under random torques of the motors, for which inverse dynamics ask."""
+    accelerations, torques = compare_motions(weighed(robot_named(name)))
+    assert accelerations < TORQUES
+    assert torques < TORQUES
+
+
+def compare_motions(robot: Mechanism) -> tuple[float, float]:
+    """At some closed configurations with random rates that the loops allow, and random torques: the largest difference
+    of accelerations of joints (to the largest), and of the torques and those of Pinocchio's inverse dynamics, both as
+    loads of these motions. Pinocchio needs the small armature for bodies without a mass."""
+    pinned, other = Pinned(robot.to_pinocchio()), Simulated(robot)
+    model, data = pinned.model, pinned.data
+    model.armature = np.full(model.nv, 1e-9)
+    driven, acted = list_motors(pinned, other)
+    loops, rng = pinned.export.constraint_models, np.random.default_rng(0)
+    settings = pin.ProximalSettings(1e-14, 1e-10, 100)
+    accelerations, torques = 0.0, 0.0
+    for q, Z, Y in walk_in_both(robot, pinned, other):
+        rates, loads = rng.normal(size=Z.shape[1]), rng.normal(size=len(driven))
+        v, tau, force = Z @ rates, np.zeros(model.nv), np.zeros(other.model.nv)
+        tau[driven], force[acted] = loads, loads
+        pin.initConstraintDynamics(model, data, loops, pinned.own)
+        found = pin.constraintDynamics(model, data, q, v, tau, loops, pinned.own, settings).copy()
+        theirs = other.accelerate(Y, Y @ rates, force)
+        for number in range(other.model.njnt):
+            joint = other.model.joint(number)
+            if model.existJointName(joint.name):  # none of a loop
+                own = model.joints[model.getJointId(joint.name)]
+                at, start = own.idx_v, joint.dofadr[0]
+                missed = found[at : at + own.nv] - theirs[start : start + own.nv]
+                accelerations = max(accelerations, np.abs(missed).max() / np.abs(theirs).max())
+        needed = Z.T @ pin.rnea(model, data, q, v, found)
+        torques = max(torques, np.abs(needed - Z[driven].T @ loads).max())
+    return accelerations, torques

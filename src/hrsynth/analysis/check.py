@@ -191,6 +191,11 @@ class LoopCheck(Result, shown_as="loop_check"):
     redundant: Recorded[tuple[Redundancy, ...]]
     more: Recorded[tuple[str, ...]]
 
+    @property
+    def command(self) -> str:
+        """Command that prints the result."""
+        return "check"
+
     @classmethod
     def of(cls, robot: Mechanism, why: str) -> LoopCheck:
         """Return the loop check of a mechanism, and ``why`` no more is possible; raises ``SamplingFailure``,

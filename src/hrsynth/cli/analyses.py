@@ -9,7 +9,7 @@ from typing import Any
 
 from ..index import list_analyses, list_analysis_options
 from ..options import OUTPUT, Option, output
-from ..present.outputs import File, get_outputs
+from ..present.outputs import File, get_outputs, list_file_fields
 from ..progress import on_progress
 from .colour import paint, print_text
 from .commands import Group, add_command
@@ -54,7 +54,7 @@ class Question:
         if self.needs is not None and not json and not any(files.values()):
             self.needs()
         source = {each.name: values[each.name] for each in SOURCE}
-        more = {each.record: None for each in files if each.record is not None}
+        more: dict[str, Any] = dict(list_file_fields(self.name))
         writers = []
         with Progress() as progress, on_progress(progress.tell):
             mechanism = load_robot(values)

@@ -213,6 +213,7 @@ def _lead(
     )
     rows = np.eye(model.nv)[places] @ home.kernel()[0]
     rank = compute_range_basis(rows, 1.0)[1].value
+    strengths_at_zero = np.linalg.svd(rows, compute_uv=False)[:rank]
     free = np.sort(qr(rows.T, mode="r", pivoting=True)[1][:rank])
     at_zero = model.difference(model.q0, home.q)
     every = np.array([i for joint in list_coordinate_joints(robot) for i in model.coordinates[joint.name]])
@@ -242,6 +243,8 @@ def _lead(
         if part < 1:
             sides, strengths, _ = np.linalg.svd(np.eye(model.nv)[places[free]] @ here.kernel()[0])
             held, least = axes[free[np.argmax(np.abs(sides[:, -1]))]][0], strengths.min()
+            if len(here.strengths) and here.strengths[-1] * strengths_at_zero.min() < least * home.strengths[-1]:
+                raise refuse(f"the loops lose rank ahead (smallest singular value {here.strengths[-1]:.2g})")
             raise refuse(f"a singularity lies ahead, at which {held} stops (least singular value {least:.2g})")
     missed = np.abs(model.difference(model.q0, here.q)[places] - values)
     if missed.max() > PRINTED_POSE_TOL:

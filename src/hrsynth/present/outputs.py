@@ -416,6 +416,13 @@ def get_outputs(name: str) -> Outputs:
     return Outputs(kind.text, (file,) if makers else ())
 
 
+def list_file_fields(name: str) -> dict[str, None]:
+    """Return the JSON fields of the files of a command, none of which is written."""
+    files = [file for file in get_outputs(name).files if file.option is not None]
+    every = (*(file.record for file in files), *(file.field for file in files))
+    return dict.fromkeys(field for field in every if field is not None)
+
+
 def _format_csv(found: Result) -> bytes:
     """The rows of an answer as comma-separated values."""
     return encode_csv(found.rows())

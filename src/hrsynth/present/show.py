@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from ..characters import name_steering
@@ -16,7 +17,7 @@ from ..errors import BadRequest, MissingExtra
 from ..options import require_range
 from ..results import Result, with_spelling
 from ..version import __version__
-from .outputs import FIGURES, OUTPUTS, File, get_outputs, load_function
+from .outputs import CSV, FIGURES, OUTPUTS, File, get_outputs, list_file_fields, load_function
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -130,6 +131,59 @@ def html(result: Result) -> str:
             said = f"{said}\n\n{error}"
     shown = re.sub("(.)\u0332", r"<u>\1</u>", markup.escape(name_steering(said)))
     return f'<pre style="white-space: pre; overflow-x: auto">{shown}</pre>'
+
+
+def to_json(result: Result) -> str:
+    """Return a result as the JSON text that its command prints with ``--json``; also as ``Result.to_json()``.
+
+    Parameters
+    ----------
+    result
+        Result of an analysis.
+
+    Returns
+    -------
+    str
+        One JSON object.
+
+    Examples
+    --------
+    >>> import json
+    >>> json.loads(hrsynth.to_json(hrsynth.legs("rrrrr_m1")))["robot"]
+    'rrrrr_m1'
+    """
+    setup = getattr(result, "setup", None)
+    asked = (getattr(setup, "robot", setup), getattr(result, "robot", None))
+    robot: Any = next((value for value in asked if isinstance(value, Result)), None)
+    return format_record(result.command, robot, {**result.to_dict(), **list_file_fields(result.command)})
+
+
+def to_pandas(result: Result) -> Any:
+    """Return a result as a ``pandas.DataFrame``; also as ``Result.to_pandas()``.
+
+    Parameters
+    ----------
+    result
+        Result of an analysis.
+
+    Returns
+    -------
+    pandas.DataFrame
+        The table that the command writes as .csv (grid, plane, basins), or else the one row of ``to_row()``.
+
+    Raises
+    ------
+    MissingExtra
+        If pandas is not installed.
+    """
+    try:
+        pandas = import_module("pandas")
+    except ModuleNotFoundError:
+        raise MissingExtra("a table of pandas", "pandas", package=True) from None
+    for file in get_outputs(result.shown_as).files:
+        if CSV in file.makers and (file.part is None or getattr(result, file.part) is not None):
+            return pandas.read_csv(io.BytesIO(_render_content(file, result, {}, CSV)))
+    return pandas.DataFrame([result.to_row()])
 
 
 @with_spelling

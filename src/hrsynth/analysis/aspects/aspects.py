@@ -24,7 +24,7 @@ from ...tolerances import HIDDEN_ROBOT_RESIDUAL_TOL
 from ..analysis_declaration import analysis
 from ..modes.modes import AssemblyModes, at_mode, modes
 from ..observation_inputs import CameraLike, LegsLike, Seed, SensorLike
-from ..observed import RobotLike
+from ..observed import ObservedRobot, RobotLike
 from .path import PATH_INTERVALS_MAX, PathAnswer, PathPlanner
 from .vector_expressions import NoLegForm
 from .verdicts import SAME, SEPARATED, UNDECIDED
@@ -77,6 +77,11 @@ class AspectTable(Result, shown_as="aspects"):
     listed: Annotated[AssemblyModes, FLAT]
     places: tuple[ClosedConfiguration | None, ...]
     pairs: Recorded[tuple[ModePair, ...]]
+
+    @property
+    def setup(self) -> ObservedRobot:
+        """The observed robot."""
+        return self.listed.setup
 
     def headline(self) -> str:
         """Return the robot, the number of modes and of aspects."""
