@@ -68,7 +68,8 @@ def test_a_configuration_is_found_again_by_its_joints(name: str, motors: bool) -
         wanted = {name: read_joints(at)[name] for name in names}
         (found,) = solve_requested_poses(setup, [JointPose(motors, tuple(wanted.items()))])
         if isinstance(found, PoseReachFailure):
-            assert found.reason.startswith(("a singularity lies ahead", "with the other coordinates fixed"))
+            reasons = "a singularity lies ahead", "the loops lose rank", "with the other coordinates fixed"
+            assert found.reason.startswith(reasons)
             continue
         told = read_joints(found)
         assert max(np.abs(np.subtract(told[name], wanted[name])).max() for name in names) < 1e-6
