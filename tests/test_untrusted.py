@@ -38,6 +38,7 @@ from hrsynth.description.meshes import locate_mesh, read_robot_meshes
 from hrsynth.errors import BadRequest, HrsynthError, InvalidCertificate
 from hrsynth.mechanism.model import make_fresh_name
 from hrsynth.untrusted import ARCHIVE_FILES_MAX, UNPACKED_MAX_BYTES
+from patience import allow
 
 ROOT = Path(__file__).resolve().parent.parent
 LINKS = '<link name="base"/><link name="crank">{}</link><link name="bar"/><link name="rocker"/>'
@@ -352,7 +353,7 @@ def test_meshes_open_no_other_files_and_unpickle_nothing(tmp_path: Path):
     names = ["good.obj", "in.gltf", "pipe.obj", *others]
     start = time.monotonic()
     found = read_robot_meshes(names, str(inner / "robot.urdf"))
-    assert time.monotonic() - start < 2 * SECONDS
+    assert time.monotonic() - start < allow(2 * SECONDS)
     assert [name for name, mesh in found.items() if mesh is not None] == ["good.obj", "in.gltf", "pipe.obj"]
     assert not hit.exists()
 
@@ -559,7 +560,7 @@ def test_a_small_certificate_is_checked_soon(what: str, record: dict[str, Any]):
     start = time.process_time()
     with pytest.raises(InvalidCertificate, match=r"n < 25|terms|unknowns|rows or columns"):
         verify({**record, "sha256": checker.digest(record)})
-    assert time.process_time() - start < 5
+    assert time.process_time() - start < allow(5)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 7, 8, 9, 1000])
@@ -586,7 +587,7 @@ def test_of_many_frames_that_nearly_meet_some_are_named(tmp_path: Path):
     file.write_text(f'<robot name="r"><link name="l0"/>{"".join(tree)}</robot>')
     start = time.process_time()
     assert run_command(["check", str(file), "--platform", "l9"]) in (2, 3)
-    assert time.process_time() - start < 20
+    assert time.process_time() - start < allow(20)
 
 
 def test_files_beside_a_robot_that_are_large_together_are_not_read(tmp_path: Path):

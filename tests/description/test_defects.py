@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from description.samples import FOUR_BAR
 from hrsynth.description import load, native
 from hrsynth.errors import BadRobotFile, LoopClosureFailure
+from patience import allow
 
 UNIVERSAL = ('<loop name="d" type="revolute">', '<loop name="d" type="universal">')
 
@@ -309,7 +310,7 @@ def test_an_entity_bomb_is_refused_at_once():
     bomb = f'<?xml version="1.0"?>\n<!DOCTYPE robot [\n<!ENTITY a "ha">\n{entities}\n]>\n<robot name="&p;">&p;</robot>'
     start = time.perf_counter()
     assert defects(bomb) == [(2, "a document type declaration is not allowed, None, None")]
-    assert time.perf_counter() - start < 1
+    assert time.perf_counter() - start < allow(1)
 
 
 def test_a_comment_may_speak_of_declarations():

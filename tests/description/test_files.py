@@ -13,6 +13,7 @@ from hrsynth import description
 from hrsynth.description import files
 from hrsynth.errors import BadRequest, BadRobotFile
 from hrsynth.mechanism.model import Mechanism
+from patience import allow
 
 
 def refused(path: str | Path) -> str:
@@ -47,7 +48,7 @@ def test_junk_of_200_megabytes_is_refused_without_reading(tmp_path: Path):
         stream.truncate(200_000_000)
     start = time.perf_counter()
     assert "file too large: got 200000000 bytes" in refused(path)
-    assert time.perf_counter() - start < 0.2
+    assert time.perf_counter() - start < allow(0.2)
 
 
 def test_what_is_no_file_is_refused(tmp_path: Path):

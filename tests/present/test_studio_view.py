@@ -13,6 +13,7 @@ import pytest
 
 from hrsynth.mechanism import JointType
 from hrsynth.present.view.view import View, view
+from patience import allow
 from present.studio_client import Page, opened, posted, status_of
 from present.views import miss, moved, seen, serving
 from strategies import planar
@@ -123,7 +124,7 @@ def test_bombs_in_robot_files_are_refused_in_lines_and_cost_nothing():
                 assert status_of(posted(server, page.start["tab"], name, text.encode())) == 200
                 begin = time.monotonic()
                 answer = page.ask("open", robot={"source": f"file:{name}", "options": {}}, watch=None, camera=None)
-                assert time.monotonic() - begin < 20, name
+                assert time.monotonic() - begin < allow(20), name
                 assert set(answer) == {"n", "error", "kind"} or answer["answer"]["failed"], name
                 assert answer.get("kind") not in ("Defect", "Ended", "TooSlow"), (name, answer)
                 assert "root:" not in str(answer)

@@ -16,6 +16,7 @@ from hrsynth.description.formats.urdf.xacro import expand
 from hrsynth.description.formats.urdf.xacro_process import CONSTANTS, MATH, PYTHON, VALUES, Expression
 from hrsynth.description.meshes import locate_mesh
 from hrsynth.errors import BadRequest, BadRobotFile, HrsynthError
+from patience import allow
 
 xacro = pytest.importorskip("xacro")
 
@@ -304,7 +305,7 @@ def test_large_values_and_other_files_are_refused_in_time(name: str, tmp_path: P
     start = time.monotonic()
     with pytest.raises(BadRobotFile) as refused:
         load(folder / "robot.urdf")
-    assert time.monotonic() - start < 20
+    assert time.monotonic() - start < allow(20)
     assert len(refused.value.lines()[0]) < 1000
 
 
