@@ -25,8 +25,8 @@ SLOW = {"aspects", "draw", "select"}
     "name", [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in FUNCTIONS]
 )
 def test_help_has_an_example_that_works(name: str):
-    if name == "studio":
-        pytest.importorskip("uvicorn")
+    if (needed := {"studio": "uvicorn", "to_pandas": "pandas"}.get(name)) is not None:
+        pytest.importorskip(needed)
     (example,) = doctest.DocTestFinder(recurse=False).find(getattr(hrsynth, name), name, globs={"hrsynth": hrsynth})
     assert f"hrsynth.{name}(" in example.docstring
     assert doctest.DocTestRunner(verbose=False).run(example).failed == 0

@@ -175,6 +175,11 @@ def to_pandas(result: Result) -> Any:
     ------
     MissingExtra
         If pandas is not installed.
+
+    Examples
+    --------
+    >>> list(hrsynth.to_pandas(hrsynth.check("delta", grid="x=0:0.1:2,z=-0.6")).columns[:3])
+    ['x', 'z', 'state']
     """
     try:
         pandas = import_module("pandas")
