@@ -28,7 +28,7 @@ def test_a_terminal_shows_the_stages_and_is_left_clean(monkeypatch: pytest.Monke
     shown = run(monkeypatch, Terminal(), 1001)
     lines = shown.split("\r")
     assert any("sampling, step" in line for line in lines)
-    assert max(map(len, lines)) == progress.SHOWN_COLUMNS
+    assert max(map(len, lines)) == progress.SHOWN_COLUMNS_COUNT
     assert lines[-1] == ""
     assert not lines[-2].strip()
 

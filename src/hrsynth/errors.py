@@ -194,9 +194,10 @@ class MotorsNotEnough(NoResult):
 class UndecidedRank(NoResult):
     """Rank with a gap too small for a verdict."""
 
-    def __init__(self, what: str, gap: float, needed: float, remedy: str = "") -> None:
+    def __init__(
+        self, what: str, gap: float, needed: float, remedy: str = "Give more decimals, or observe other links."
+    ) -> None:
         self.what, self.gap, self.needed = what, gap, needed
-        remedy = remedy or "Give more decimals; if the numbers are exact, observe other or more links."
         super().__init__(f"{what}: rank undecided: gap {gap:.3g}, needed {needed:.3g}", remedy)
 
 

@@ -12,7 +12,7 @@ from contextvars import ContextVar
 
 SHOWN_AFTER_S, SHOWN_AGAIN_S = 2.0, 0.5
 """Seconds before an analysis in Python shows its progress, and between two updates."""
-SHOWN_COLUMNS = 78
+SHOWN_COLUMNS_COUNT = 78
 """Width of that line."""
 
 _listener: ContextVar[Callable[[str], None] | None] = ContextVar("listener", default=None)
@@ -54,15 +54,15 @@ def show_progress() -> Iterator[None]:
         steps, now = steps + 1, time.monotonic()
         if now - began > SHOWN_AFTER_S and now - written > SHOWN_AGAIN_S:
             written, is_shown = now, True
-            line = f"{stage}, step {steps}, {now - began:.0f} s"[:SHOWN_COLUMNS]
-            print(f"\r{line:{SHOWN_COLUMNS}}", end="", file=sys.stderr, flush=True)
+            line = f"{stage}, step {steps}, {now - began:.0f} s"[:SHOWN_COLUMNS_COUNT]
+            print(f"\r{line:{SHOWN_COLUMNS_COUNT}}", end="", file=sys.stderr, flush=True)
 
     try:
         with on_progress(show):
             yield
     finally:
         if is_shown:
-            print(f"\r{'':{SHOWN_COLUMNS}}\r", end="", file=sys.stderr, flush=True)
+            print(f"\r{'':{SHOWN_COLUMNS_COUNT}}\r", end="", file=sys.stderr, flush=True)
 
 
 @contextmanager

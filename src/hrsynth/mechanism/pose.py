@@ -346,7 +346,7 @@ class Grid(Value):
         if isinstance(text, Grid):
             return text
         if not isinstance(text, str):
-            raise BadRequest("a grid", text, GRIDS)
+            raise BadRequest("a grid", text, f"a text such as {GRIDS}")
         kind, colon, rest = text.strip().partition(":")
         kind = kind if colon and kind in ("joints", "motors") else ""
         axes: list[tuple[str, Array]] = []

@@ -178,8 +178,8 @@ def to_pandas(result: Result) -> Any:
 
     Examples
     --------
-    >>> list(hrsynth.to_pandas(hrsynth.check("delta", grid="x=0:0.1:2,z=-0.6")).columns[:3])
-    ['x', 'z', 'state']
+    >>> list(hrsynth.to_pandas(hrsynth.check("3rrr_m1", grid="x=0:0.01:2,y=0")).columns[:3])
+    ['x', 'y', 'state']
     """
     try:
         pandas = import_module("pandas")
