@@ -158,6 +158,8 @@ def test_a_grid_of_joints_requests_each_cell() -> None:
         ("roll=0:1:3,rpy=0/0/0", "rpy and roll"),
         ("roll=0,phi=0:1:3", "phi and roll"),
         ("motors:a=0", "number of ranges"),
+        ("motors:a=0:1e9:3", "below 100"),
+        ("motors:", "motors:NAME="),
         ("motors:0:1:3", "name=value"),
         ("joints:a=0:1:3,a=1", "twice"),
         ("joints:a=0:b:3", "not a number"),

@@ -359,6 +359,8 @@ class Grid(Value):
                 raise BadRequest("grid: a range of rpy", value, "ranges of " + ", ".join((*SCALARS, *TURNS)))
             else:
                 axes.append((name, _parse_range(value, name, text, largest)))
+                if kind:
+                    _parse_coordinates(kind, axes[-1][1][[0, -1]].tolist())
                 units += [(name, unit) for unit in UNITS if unit in value]
         if not 1 <= len(axes) <= 3:
             raise BadRequest("grid: number of ranges", text, f"one to three, such as {GRIDS}")
@@ -533,7 +535,7 @@ def _split_fields(text: str, what: str, known: Sequence[str] = PARTS) -> list[tu
     for part in text.split(","):
         name, equals, value = (piece.strip() for piece in part.partition("="))
         if not equals:
-            raise BadRequest(f"{what}: not name=value", part.strip(), EXAMPLE)
+            raise BadRequest(f"{what}: not name=value", part.strip(), EXAMPLE if known else GRIDS)
         if known and name not in known:
             raise BadRequest(f"{what}: unknown part", name, known)
         if name in dict(found):
