@@ -49,7 +49,7 @@ class Coordinates(Value):
         twists = compute_relation(start, observation_model.of_platform).twists
         if twists.shape[1] != motion.dof:
             twists = motion.twists
-        if motion.rotations.shape[1] == 1:
+        if motion.has_one_rotation:
             twists = np.vstack([twists[:3], motion.normal @ twists[3:]])
         rows = twists if motion.body else twists[:3]
         size = min(motion.dof, len(rows))
@@ -73,14 +73,14 @@ class Coordinates(Value):
         """Return the difference of a platform pose X (4, 4) from the coordinates (n,), metres, radians; a rotation
         about one axis modulo 2π."""
         found = self.read(X) - self.values
-        if self.motion.rotations.shape[1] == 1:
+        if self.motion.has_one_rotation:
             found = np.array([wrap_angle(x) if place == 3 else x for x, place in zip(found, self.places, strict=True)])
         return found
 
     def _turn(self, X: Array) -> tuple[Array, Array]:
         """Return the rotation since the zero configuration, and the map from the angular velocity to its rate."""
         R = X[:3, :3] @ self.motion.home[:3, :3].T
-        if self.motion.rotations.shape[1] == 1:
+        if self.motion.has_one_rotation:
             angle, row = turn_about(self.motion.normal, R)
             return np.array([angle]), row[None]
         turn = convert_rotations_to_vectors(R)

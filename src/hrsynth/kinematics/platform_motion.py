@@ -158,7 +158,7 @@ class PlatformMotion(Value):
     @property
     def normal(self) -> Array:
         """The axis of phi: the one about which the platform rotates (its largest component positive), else z."""
-        return orient_axis(self.rotations[:, 0]) if self.rotations.shape[1] == 1 else np.array([0.0, 0.0, 1.0])
+        return orient_axis(self.rotations[:, 0]) if self.has_one_rotation else np.array([0.0, 0.0, 1.0])
 
     @property
     def is_planar(self) -> bool:
@@ -221,11 +221,11 @@ class PlatformMotion(Value):
                 raise BadRequest(f"{robot}: the platform cannot change {name}", str(pose), self.parts)
         pose = pose.without(constant)
         normal, phi, rotation = self.normal, pose.phi, pose.rotation
-        if rotation is not None and self.rotations.shape[1] == 1:
-            turn, normal = rotation @ self.home[:3, :3].T, self.rotations[:, 0]
+        if rotation is not None and self.has_one_rotation:
+            turn = rotation @ self.home[:3, :3].T
             phi, rotation = turn_about(normal, turn)[0], None
             if np.linalg.norm(turn @ normal - normal) > PRINTED_POSE_TOL:
-                axis = " ".join(f"{x:.4g}" for x in self.rotations[:, 0])
+                axis = " ".join(f"{x:.4g}" for x in normal)
                 raise BadRequest(
                     f"{pose}: the platform of {robot} rotates about one axis only",
                     remedy=f"Use phi, or a rotation about {axis}.",

@@ -1,4 +1,5 @@
-"""Server of the page, on this machine only. It reads no robot: it serves its own files and passes requests on."""
+"""Server of the page, on this machine only. It reads no robot but to check options of the command line at its start: it
+serves its own files and passes requests on."""
 
 from __future__ import annotations
 

@@ -34,8 +34,6 @@ from .tables import (
     wrap_lines,
 )
 
-JOINTS_FOLLOW = "motors that are not given are at their zero, other joints follow the loops"
-
 if TYPE_CHECKING:
     from ...analysis.aspects.aspects import AspectTable, ModePair
     from ...analysis.aspects.path import PathAnswer, SampledRoute
@@ -84,7 +82,7 @@ def check(found: Check) -> str:
         counts = Counter(found.grid.states)
         axes = zip(found.grid.grid.shape, found.grid.grid.names, strict=True)
         size = " × ".join(f"{count} {name}" for count, name in axes)
-        fixed, free = found.grid.grid.fixed_text, ", ".join(_list_free_parts(found.grid))
+        fixed = found.grid.grid.fixed_text
         beyond = sum(bool(each.beyond_limits) for each in found.grid.postures if each is not None)
         rows.append(
             (
@@ -94,11 +92,7 @@ def check(found: Check) -> str:
                     *([found.grid.dependent] if found.grid.dependent else []),
                     *([f"{beyond} beyond joint limits"] if beyond else []),
                     *([f"fixed: {fixed}"] if fixed else []),
-                    f"free, chosen nearest to the zero configuration: {free}"
-                    if free
-                    else JOINTS_FOLLOW
-                    if found.grid.grid.joints
-                    else "no free coordinate",
+                    _describe_free_parts(found.grid),
                 ],
             )
         )
@@ -137,6 +131,14 @@ def format_loop_check(found: LoopCheck) -> str:
             ("for more", [line for each in found.more for line in wrap_lines(each, LINE - TABLE_NAME_COLUMNS_MAX)]),
         ]
     )
+
+
+def _describe_free_parts(grid: GridCheck) -> str:
+    """Describe what a grid leaves free, and where that is."""
+    if grid.grid.joints:
+        return "motors that are not given are at their zero, other joints follow the loops"
+    free = ", ".join(_list_free_parts(grid))
+    return f"free, chosen nearest to the zero configuration: {free}" if free else "no free coordinate"
 
 
 def _list_free_parts(grid: GridCheck) -> Iterator[str]:
