@@ -10,6 +10,7 @@ from inspect import signature
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 import hrsynth
@@ -152,6 +153,33 @@ def test_pictures_of_grids():
     grid = "x=-0.02:0.02:3,y=0.3:0.34:3"
     for found in (hrsynth.check(robot, grid=grid), hrsynth.accuracy(robot, cone="0.1deg", grid=grid)):
         assert hrsynth.draw(found)._repr_png_().startswith(b"\x89PNG")
+
+
+def test_a_result_is_drawn_in_axes_of_a_figure_of_the_reader():
+    """The curve in the axes holds the numbers of the grid, and the style of the figure is untouched."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    found, before = hrsynth.check("rrrrr_m1", grid="x=-0.02:0.02:5,y=0.3"), dict(matplotlib.rcParams)
+    place, other = Figure().subplots(1, 2)
+    hrsynth.draw(found, ax=place)
+    drawn = [line.get_xydata() for line in place.lines if len(line.get_xydata()) == 5]
+    values = found.grid.values("type2")  # type: ignore[union-attr]
+    assert np.array_equal(drawn[0], np.column_stack([np.linspace(-0.02, 0.02, 5), values]))
+    assert "rrrrr_m1" in place.get_title()
+    assert place.get_legend() is None
+    assert dict(matplotlib.rcParams) == before
+    hrsynth.draw(hrsynth.check("rrrrr_m1", grid="x=-0.02:0.02:3,y=0.3:0.34:3"), ax=other)
+    assert len(place.figure.axes) == 3  # with the scale of colours
+    for ax, result, words in (
+        ([place, other], found, "got 2, expected 1"),
+        (place, hrsynth.modes("3rrr_m1"), "layout of its own"),
+        (place, hrsynth.derive("3rrr_m1"), "not for this result"),
+    ):
+        with pytest.raises(BadRequest, match=words):
+            hrsynth.draw(result, ax=ax)
+    with pytest.raises(BadRequest, match="Save the figure"):
+        hrsynth.draw(found, "map.png", ax=place)  # type: ignore[call-overload]
 
 
 @pytest.mark.some(2)

@@ -31,12 +31,13 @@ WIDTHS, TEXTS = (1.0, 40.0), (4.0, 40.0)
 class Paper:
     """Format of a figure: the suffix of its file, its width (inches), the size (points) of its text and its font;
     None: as it was made. Figures are laid out with text of the usual size in the ``room`` that this leaves, and then
-    scaled as a whole."""
+    scaled as a whole. ``given`` are axes of a figure that is not ours, in which to draw instead."""
 
     ending: str = ".png"
     width: float | None = None
     size: float | None = None
     font: str | None = None
+    given: tuple[Any, ...] = ()
 
     @property
     def room(self) -> float:
@@ -45,7 +46,9 @@ class Paper:
 
     def wide(self, natural: float) -> float:
         """Return the width (inches) of a layout that has ``natural`` if it is free: all of the room if the text size is
-        requested too."""
+        requested too. Raise ``BadRequest`` if axes are given: the figure has a layout of its own."""
+        if self.given:
+            raise BadRequest("ax: this figure has a layout of its own", remedy="Omit ax, and give a file.")
         return self.room if self.width is not None and self.size is not None else min(natural, self.room)
 
     def axes(self, natural: float, least: float = AXES) -> float:
@@ -76,6 +79,21 @@ class Paper:
 
 
 PNG = Paper()
+
+
+@dataclass(frozen=True)
+class GivenFigure:
+    """Figure of given axes, as a maker sees it: the title and the legend belong to the first of them."""
+
+    axes: tuple[Any, ...]
+
+    def suptitle(self, text: str) -> Any:
+        """Set the title."""
+        return self.axes[0].set_title(text)
+
+    def colorbar(self, *given: Any, **named: Any) -> Any:
+        """Draw a scale of colours beside axes."""
+        return self.axes[0].figure.colorbar(*given, **named)
 
 
 def choose_paper(ending: str, width: str | None, font: str | None) -> Paper:
@@ -119,6 +137,8 @@ def print_figure(figure: Any, paper: Paper) -> bytes:
     """The bytes of a matplotlib figure; of a PNG without ``savefig``, which would draw it twice."""
     import matplotlib.text
 
+    if paper.given:
+        return b""
     for each in figure.findobj(matplotlib.text.Text):
         each.set_text(name_steering(each.get_text()))
     stream = io.BytesIO()

@@ -7,7 +7,7 @@ on use.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -134,9 +134,8 @@ class File:
         """Return the content of the file and further JSON fields; raise ``BadRequest`` if there is nothing to draw."""
         maker = load_function(self.makers[ending])
         if ending in FIGURES and self.drawn:
-            maker = partial(
-                maker, paper=load_function("figure_format:choose_paper")(ending, asked.get("width"), asked.get("font"))
-            )
+            paper = load_function("figure_format:choose_paper")(ending, asked.get("width"), asked.get("font"))
+            maker = partial(maker, paper=replace(paper, given=asked.get("axes", ())))
         if self.computed is None:
             return maker(found), {}
         value = load_function(self.computed)(found, **{name: asked[name] for name in (*self.takes, "seed")})

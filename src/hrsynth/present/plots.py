@@ -11,14 +11,14 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from ..errors import MissingExtra
+from ..errors import BadRequest, MissingExtra
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import PlatformMotion
 from ..mechanism import Mechanism
 from ..mechanism.pose import ANGLES, Grid, JointPose, Pose
 from ..results import Result
-from .figure_format import BESIDE, PNG, Paper, draw_legend_within, print_figure
+from .figure_format import BESIDE, PNG, GivenFigure, Paper, draw_legend_within, print_figure
 from .skeleton import trace_leg_outlines, trace_link_outline
 from .sketch import Sketch, label_axis
 from .view.view import find_plane_normal
@@ -57,6 +57,8 @@ def in_style(draw: Callable[Asked, Given]) -> Callable[Asked, Given]:
         require_matplotlib()
         import matplotlib.style
 
+        if getattr(named.get("paper"), "given", ()):  # the style of the figure that has these axes
+            return draw(*given, **named)
         with matplotlib.style.context([STYLE, {"text.parse_math": False}]), warnings.catch_warnings():
             warnings.filterwarnings("ignore", r"Glyph \d+ ")  # drawn as a box
             return draw(*given, **named)
@@ -84,12 +86,22 @@ def make_panels(
     least: float = 0.0,
 ) -> tuple[Any, Any]:
     """A figure and its axes, row by row: ``width``, ``height`` (inches) where the paper has room, and else narrower
-    with axes of the same shape; ``around`` is what is not axes, ``least`` the width that each needs."""
+    with axes of the same shape; ``around`` is what is not axes, ``least`` the width that each needs. Raise
+    ``BadRequest`` if the paper has given axes of another number."""
+    if paper.given:
+        require_axes_count(paper, rows * columns)
+        return GivenFigure(paper.given), paper.given
     wide = paper.axes(width, least * columns)
     height = around[1] + (height - around[1]) * (wide - around[0]) / (width - around[0])
     figure = make_empty_figure(wide, height, layout="constrained")
     figure.get_layout_engine().set(w_pad=FIGURE_PADDING_INCHES_MIN, h_pad=FIGURE_PADDING_INCHES_MIN)
     return figure, figure.subplots(rows, columns, squeeze=False).ravel()
+
+
+def require_axes_count(paper: Paper, count: int) -> None:
+    """Raise ``BadRequest`` unless a figure of so many panels fits the given axes."""
+    if len(paper.given) != count:
+        raise BadRequest("ax: number of axes for this figure", len(paper.given), str(count))
 
 
 def convert_to_ticks(name: str, values: Array) -> Array:
@@ -311,9 +323,12 @@ def make_missing_entry() -> Any:
 
 def draw_legend(figure: Any, entries: Sequence[Any], paper: Paper) -> None:
     """The legend beside the axes, or below where the paper is narrow, where there is something to explain."""
-    wide = figure.get_figwidth()
     if not entries:
         return
+    if paper.given:
+        paper.given[0].legend(handles=entries, fontsize="small", framealpha=0.7)
+        return
+    wide = figure.get_figwidth()
     if wide + BESIDE <= paper.room + 1e-9:
         figure.set_figwidth(wide + BESIDE)
         figure.legend(handles=entries, loc="outside right center", labelspacing=0.8)
@@ -325,6 +340,6 @@ def draw_legend(figure: Any, entries: Sequence[Any], paper: Paper) -> None:
 @in_style
 def draw_own_figure(found: Result, paper: Paper = PNG) -> bytes:
     """The figure that an answer draws itself."""
-    figure = make_empty_figure(paper.wide(OWN_WIDTH), OWN_HEIGHT)
-    found.plot(figure.add_subplot())
+    figure, (place,) = make_panels(1, 1, OWN_WIDTH, OWN_HEIGHT, paper)
+    found.plot(place)
     return print_figure(figure, paper)

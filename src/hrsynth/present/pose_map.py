@@ -45,7 +45,7 @@ class PoseMap:
         name, values = (*grid.axes, ("", np.zeros(1)))[2]
         count = len(values) if name else quantities
         side, least = (SMALL, LEAST_SMALL) if name else (SIDE, LEAST_SIDE)
-        columns = paper.columns(min(count, POSE_MAP_COLUMNS_MAX), least)
+        columns = count if paper.given else paper.columns(min(count, POSE_MAP_COLUMNS_MAX), least)
         each = -(-count // columns)
         rows, bars = (quantities * each, 1) if name else (each, columns)
         figure, axes = make_panels(
@@ -57,7 +57,7 @@ class PoseMap:
             (BAR * bars + 0.2 * columns, BELOW * rows + ABOVE),
             least if columns > 1 else 0.0,
         )
-        table = axes.reshape(quantities if name else 1, -1)
+        table = np.reshape(axes, (quantities if name else 1, -1))
         for row in table:
             for k, place in enumerate(row):
                 place.set_visible(k < count)

@@ -18,7 +18,7 @@ from ..simulation.result import Servo
 from . import palette
 from .figure_format import PNG, Paper, draw_legend_within, print_figure, wrap, wrap_title
 from .palette import SERIES
-from .plots import in_style, make_empty_figure, make_legend_entry
+from .plots import in_style, make_empty_figure, make_legend_entry, require_axes_count
 from .skeleton import trace_leg_outlines, trace_link_outline
 from .sketch import Box, Sketch
 from .view.sights import VIEW_HALF_LENGTH_FRACTION, compute_half_image, list_cameras
@@ -62,6 +62,10 @@ ENDS = {
 def draw_run(found: Servo, paper: Paper = PNG) -> bytes:
     """The run as a figure on ``paper``."""
     panels = list(_list_panels(found))
+    if paper.given:
+        require_axes_count(paper, len(panels))
+        _draw_curves(paper.given, found, panels)
+        return b""
     figure = make_empty_figure(paper.wide(WIDE), TALL)
     legs = ", ".join(found.setup.labels)
     word = "legs " if all(each.is_segment_direction for each in found.setup.observed) else ""
@@ -78,25 +82,31 @@ def draw_run(found: Servo, paper: Paper = PNG) -> bytes:
     places = figure.add_gridspec(
         len(panels), 1, left=x, bottom=y + share, right=x + wide, top=y + tall, hspace=HSPACE
     ).subplots(sharex=True)
-    times = found.run.times
-    for place, (label, curves, bottom) in zip(np.atleast_1d(places), panels, strict=True):
-        for name, values, colour, style in curves:
-            place.plot(times, values, color=colour, linestyle=style, label=name)
-        place.axhline(0, color="0.6", linewidth=0.8)
-        for passage in found.track.passages or ():
-            place.axvline(times[passage.place], color=palette.get_colour("step4"), linewidth=0.8, linestyle="dotted")
-        wrap(place.set_ylabel(label, fontsize=9), place.get_window_extent().height / figure.dpi)
-        place.set(xlim=(0, find_end_time(found) or 1.0), **({} if bottom is None else {"ylim": (bottom, None)}))
+    _draw_curves(np.atleast_1d(places), found, panels)
+    for place, (_, curves, _) in zip(np.atleast_1d(places), panels, strict=True):
+        wrap(place.yaxis.label, place.get_window_extent().height / figure.dpi)
         if len(curves) > 1 or curves[0][0]:
             place.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), **_choose_small_font(curves))
-    still = "" if find_end_time(found) >= times[-1] else f"; nearly no motion until {times[-1]:.3g} s"
-    place.set_xlabel(f"time (s){still}")
     for number, (eye, half) in enumerate(pictures):
         part = share / len(pictures)
         side = figure.add_axes((x, y + number * part, wide, part - BELOW * 1.3 / figure.get_figheight()))
         _draw_image(side, found, eye, half)
     figure.align_ylabels()
     return print_figure(figure, paper)
+
+
+def _draw_curves(places: Any, found: Servo, panels: Sequence[Panel]) -> None:
+    """Draw the panels against time, each in its axes."""
+    times, end = found.run.times, find_end_time(found)
+    for place, (label, curves, bottom) in zip(places, panels, strict=True):
+        for name, values, colour, style in curves:
+            place.plot(times, values, color=colour, linestyle=style, label=name)
+        place.axhline(0, color="0.6", linewidth=0.8)
+        for passage in found.track.passages or ():
+            place.axvline(times[passage.place], color=palette.get_colour("step4"), linewidth=0.8, linestyle="dotted")
+        place.set_ylabel(label, fontsize=9)
+        place.set(xlim=(0, end or 1.0), **({} if bottom is None else {"ylim": (bottom, None)}))
+    places[-1].set_xlabel("time (s)" + ("" if end >= times[-1] else f"; nearly no motion until {times[-1]:.3g} s"))
 
 
 def _list_images(found: Servo) -> list[tuple[NamedCamera, Array]]:
@@ -181,9 +191,11 @@ def _make_layout(figure: Any, entries: list[Any], above: float, panels: int) -> 
 
 Curve = tuple[str, Array, str, str]
 """A curve's name, its values, colour and stroke."""
+Panel = tuple[str, list[Curve], float | None]
+"""A panel's name, its curves, and the lower end of its scale."""
 
 
-def _list_panels(found: Servo) -> Iterator[tuple[str, list[Curve], float | None]]:
+def _list_panels(found: Servo) -> Iterator[Panel]:
     """Yield what is drawn against time: name, curves, lower end of the scale."""
     names = [f"leg {each.leg}" if each.is_segment_direction else each.leg for each in found.setup.observed]
     yield "error ‖eᵢ‖", [(name, found.errors[:, i], SERIES[i % 6], STYLES[i % 6]) for i, name in enumerate(names)], 0.0

@@ -6,11 +6,11 @@ import html as markup
 import io
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 from ..characters import name_steering
 from ..errors import BadRequest, MissingExtra
@@ -21,6 +21,8 @@ from .outputs import CSV, FIGURES, OUTPUTS, File, get_outputs, list_file_fields,
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from matplotlib.axes import Axes
 
     from ..mechanism.model import Mechanism
     from ..mechanism.pose import Pose
@@ -191,6 +193,19 @@ def to_pandas(result: Result) -> Any:
     return pandas.DataFrame([result.to_row()])
 
 
+@overload
+def draw(
+    result: Result,
+    file: str | Path | None = None,
+    *,
+    plane: Pose | str | None = None,
+    steps: int = 51,
+    width: str | None = None,
+    font: str | None = None,
+    ax: None = None,
+) -> Picture: ...
+@overload
+def draw(result: Result, *, plane: Pose | str | None = None, steps: int = 51, ax: Axes | Sequence[Axes]) -> None: ...
 @with_spelling
 def draw(
     result: Result,
@@ -200,7 +215,8 @@ def draw(
     steps: int = 51,
     width: str | None = None,
     font: str | None = None,
-) -> Picture:
+    ax: Any = None,
+) -> Picture | None:
     """Draw a result: schemes of a derivation, modes, aspects, a servo run, poses over a grid, or the Type 2 locus.
 
     Parameters
@@ -217,16 +233,19 @@ def draw(
         Width of the figure (``"88mm"``).
     font
         Font and size of its text (``"serif 8pt"``).
+    ax
+        Axes of matplotlib in which to draw a map, the curves of a servo run or a table of aspects instead, in the style
+        of their figure; a sequence of axes if there are several panels.
 
     Returns
     -------
     Picture
-        Figure, shown by a notebook.
+        Figure, shown by a notebook; None if ``ax`` is given.
 
     Raises
     ------
     BadRequest
-        If the result has no figure.
+        If the result has no figure, or another number of panels than axes are given.
 
     Examples
     --------
@@ -234,7 +253,11 @@ def draw(
     'png'
     """
     require_range("steps", steps, "an integer", 5, 300)
-    asked = {"plane": plane, "steps": steps, "seed": 0, "width": width, "font": font}
+    asked: dict[str, Any] = {"plane": plane, "steps": steps, "seed": 0, "width": width, "font": font}
+    if ax is not None:
+        asked["axes"] = tuple(ax.flat if hasattr(ax, "flat") else ax if isinstance(ax, Sequence) else (ax,))
+        if file is not None or width is not None or font is not None:
+            raise BadRequest("draw: ax with file, width or font", "both", remedy="Save the figure of the axes.")
     if not isinstance(result, Result):
         raise BadRequest("draw: not a result", repr(result), remedy="Give the result of a function of hrsynth.")
     for drawn in get_outputs(result.shown_as).files:
@@ -243,9 +266,12 @@ def draw(
             continue
         if plane is not None and "plane" not in drawn.takes:
             raise BadRequest("plane: not for this result", type(result).__name__, "result of singularities")
-        if not drawn.drawn and (width is not None or font is not None):
-            raise BadRequest("width, font: not for this result", type(result).__name__, remedy="Omit them.")
+        if not drawn.drawn and any(value is not None for value in (width, font, ax)):
+            raise BadRequest("width, font, ax: not for this result", type(result).__name__, remedy="Omit them.")
         draws = partial(_render_content, drawn, result, asked)
+        if ax is not None:
+            draws(endings[0])
+            return None
         ending = endings[0] if file is None else _require_ending(file, endings)
         picture = Picture(draws(ending), result.headline(), ending[1:], draws, endings)
         if file is not None:
