@@ -16,6 +16,7 @@ from description.foreign.test_models import FIGURES, model
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.vectors import Array
+from hrsynth.kinematics.joint_coordinates import collect_link_poses
 from hrsynth.kinematics.locked_twists import set_zero
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism import Mechanism
@@ -145,3 +146,32 @@ def test_couplings_and_texts_come_along():
         assert [each.ratio for each in other.couplings] == [0.5]
         assert other.joints["j"].limits == robot.joints["j"].limits
         np.testing.assert_allclose(poses(other, ("a", "b")), poses(robot, ("a", "b")), atol=AGREE)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_a_keyframe_is_the_configuration_that_was_written(name: str, tmp_path):
+    """Bodies of MuJoCo at the key lie where the links do, and both files, read back at it, are the moved robot."""
+    mujoco = pytest.importorskip("mujoco")
+    robot = hrsynth.load(name)
+    moved = collect_link_poses(walked(ObservedRobot.of(robot).all_samples.model))
+    assert moved is not None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        model = hrsynth.to_mujoco(robot, keyframes={"far": moved})
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, model.key("far").id)
+        mujoco.mj_kinematics(model, data)
+        for link, X in moved.items():
+            body = data.body(link)
+            np.testing.assert_allclose(body.xpos, X[:3, 3], atol=AGREE)
+            np.testing.assert_allclose(body.xmat.reshape(3, 3), X[:3, :3], atol=AGREE)
+        for file in ("robot.urdf", "robot.xml"):
+            hrsynth.save(robot, tmp_path / file, keyframes={"far": moved})
+            read = hrsynth.load(tmp_path / file, keyframe="far")
+            np.testing.assert_allclose(poses(read, moved), np.array([*moved.values()]), atol=1e-6)
+
+
+def test_a_format_without_keyframes_is_refused(tmp_path):
+    with pytest.raises(BadRequest, match="got 'sdf', expected mjcf, or native"):
+        hrsynth.save("delta", tmp_path / "delta.sdf", keyframes={"zero": {}})
+    assert not [*tmp_path.iterdir()]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NotRequired, TypedDict
+from typing import TYPE_CHECKING, Any, NotRequired, TypedDict
 
 from ..options import NEEDED, OUTPUT, Option, flag, output
 from ..records import Head, OfRobot, Platform
@@ -11,6 +11,13 @@ from .colour import print_text
 from .commands import Group, add_command
 from .options import EXPLAIN, JSON, SOURCE, load_robot, warn
 from .progress import Progress
+
+if TYPE_CHECKING:
+    from ..geometry.vectors import Array
+    from ..mechanism.model import Mechanism
+
+KEYFRAME = "start"
+"""Name of the keyframe that ``convert --at`` writes."""
 
 
 class ShippedRobotRecord(TypedDict):
@@ -115,7 +122,9 @@ def print_robots(examples: bool, json: bool) -> None:
         )
 
 
-def convert(target: str | None, output: str | None, to: str | None, meshes: str, json: bool, **source: Any) -> None:
+def convert(
+    target: str | None, output: str | None, to: str | None, meshes: str, at: str | None, json: bool, **source: Any
+) -> None:
     """Write a robot in another format."""
     from ..description import list_save_targets, save
     from ..description.files import require_other
@@ -126,12 +135,13 @@ def convert(target: str | None, output: str | None, to: str | None, meshes: str,
         problem = f"convert: two outputs, {target} and {output}" if target else "convert: OUT missing"
         raise BadRequest(problem, remedy="Give OUT or -o OUT.")
     target = str(target or output)
-    files, name = [str(file) for file in list_save_targets(target, to)], source["robot"]
+    files, name = [str(file) for file in list_save_targets(target, to, keyframes=at is not None)], source["robot"]
     with Progress():
         mechanism = load_robot(source)
         for file in files:
             require_other(file, name, mechanism.file)
-        lost = [str(warning) for warning in save(mechanism, target, to, meshes=meshes)]
+        keyframes = None if at is None else {KEYFRAME: _solve_link_poses(mechanism, at)}
+        lost = [str(warning) for warning in save(mechanism, target, to, meshes=meshes, keyframes=keyframes)]
     for warning in lost:
         warn(warning)
     fields = {
@@ -147,6 +157,21 @@ def convert(target: str | None, output: str | None, to: str | None, meshes: str,
         else f"{mechanism.name} with {fields['links']} links and {fields['joints']} joints, platform "
         f"{mechanism.platform_words}, is written to {' and '.join(files)}."
     )
+
+
+def _solve_link_poses(mechanism: Mechanism, at: str) -> dict[str, Array]:
+    """Return the poses of the links at a requested pose."""
+    from ..analysis.observed import ObservedRobot
+    from ..analysis.pose_requests import solve_configurations
+    from ..errors import BadRequest
+    from ..kinematics.joint_coordinates import collect_link_poses
+    from ..mechanism.pose import parse_pose
+
+    (configuration,) = solve_configurations(ObservedRobot.of(mechanism), [parse_pose(at)])
+    found = collect_link_poses(configuration)
+    if found is None:
+        raise BadRequest(f"{mechanism.name}: the joints of the file do not fit this configuration", at)
+    return found
 
 
 def verify(certificate: str, robot: str | None, json: bool) -> None:
@@ -211,6 +236,7 @@ def add(app: Group) -> None:
                 "FORMAT",
                 words=list_format_names,
             ),
+            Option("at", f"Write the robot at this pose as keyframe {KEYFRAME!r}.", "POSE", group=OUTPUT),
             JSON,
             EXPLAIN,
         ),

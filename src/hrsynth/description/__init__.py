@@ -23,10 +23,12 @@ from ..errors import (
     shorten_text,
     warn_caller,
 )
+from ..geometry.vectors import Array
 from ..mechanism.model import Mechanism, Note
 from ..results import with_spelling
 from ..tolerances import ROBOT_FILE_MAX_BYTES
 from . import formats, xml
+from .conversion import compute_written_values
 from .example_data import PREFIX, list_examples
 from .file_format import FileFormat, RobotFile
 from .files import convert_to_path, open_regular, require_same, require_writable, write_whole
@@ -312,10 +314,13 @@ def _find_named_file(name: str, files: dict[str, Path], what: str, command: str)
     )
 
 
-def list_save_targets(path: str | Path, format: str | None = None) -> tuple[Path, ...]:
+def list_save_targets(path: str | Path, format: str | None = None, *, keyframes: bool = False) -> tuple[Path, ...]:
     """Return the files that :func:`save` writes, the tree first. Raises ``BadRequest`` for an unknown format or
     extension, and for files that cannot be written."""
-    files = _choose_format(Path(path), format).files(Path(path))
+    chosen, target = _choose_format(Path(path), format), Path(path)
+    files = chosen.files(target)
+    if keyframes and chosen.keyframe_ending:
+        files = (*files, target.with_suffix(chosen.keyframe_ending))
     for file in files:
         require_writable(file)
     return files
@@ -323,7 +328,12 @@ def list_save_targets(path: str | Path, format: str | None = None) -> tuple[Path
 
 @with_spelling
 def save(
-    mechanism: Mechanism | str | Path, path: str | Path, format: str | None = None, *, meshes: str = "keep"
+    mechanism: Mechanism | str | Path,
+    path: str | Path,
+    format: str | None = None,
+    *,
+    meshes: str = "keep",
+    keyframes: Mapping[str, Mapping[str, Array]] | None = None,
 ) -> tuple[Note, ...]:
     """Write a robot file, completely or not at all, and return warnings of what the format cannot express.
 
@@ -341,6 +351,9 @@ def save(
     meshes
         ``keep``: meshes stay and are named from the new file's folder; ``copy``: they are copied to ``meshes/`` next to
         it.
+    keyframes
+        Link poses by keyframe, such as ``link_poses`` of a result of ``check`` or ``modes``: keys of MJCF, or group
+        states of an SRDF file next to a URDF. Turns are within half a turn of the zero configuration.
 
     Returns
     -------
@@ -369,7 +382,12 @@ def save(
     try:
         found = formats.get_writer(chosen.name)(robot)
         texts = zip(chosen.files(target), found.texts, strict=True)
-        contents = {file: chosen.packed(text, file) for file, text in texts}
+        written = dict(texts)
+        if keyframes:
+            write = formats.get_keyframe_writer(chosen.name)
+            values = {name: compute_written_values(robot, poses) for name, poses in keyframes.items()}
+            written |= write(written[target], target, values)
+        contents = {file: chosen.packed(text, file) for file, text in written.items()}
         for file, content in contents.items():
             if file != target:
                 require_same(file, content)
@@ -408,13 +426,15 @@ def to_urdf(robot: Mechanism | str | Path) -> str:
 
 
 @with_spelling
-def to_mujoco(robot: Mechanism | str | Path) -> MjModel:
+def to_mujoco(robot: Mechanism | str | Path, *, keyframes: Mapping[str, Mapping[str, Array]] | None = None) -> MjModel:
     """Return a robot with its loops as a MuJoCo model; also as ``Mechanism.to_mujoco()``.
 
     Parameters
     ----------
     robot
         Mechanism, path of a file, or name of a shipped robot.
+    keyframes
+        Link poses by keyframe, as in :func:`save`.
 
     Returns
     -------
@@ -443,7 +463,7 @@ def to_mujoco(robot: Mechanism | str | Path) -> MjModel:
     mujoco = load_mujoco("a model of MuJoCo")
     with tempfile.TemporaryDirectory() as folder:
         file = f"{folder}/robot.xml"
-        for note in save(robot, file):
+        for note in save(robot, file, keyframes=keyframes):
             warn_caller(shorten_text(note.text, WARNING_CHARACTERS_MAX), UserWarning)
         return mujoco.MjModel.from_xml_path(file)
 

@@ -6,12 +6,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..errors import BadMechanism
+from ..errors import BadMechanism, BadRequest
 from ..geometry.so3 import decompose_rotation
-from ..geometry.vectors import Array, build_pose, normalise_vector, rotate_about_axis
+from ..geometry.vectors import Array, build_pose, invert_pose, normalise_vector, rotate_about_axis
 from ..mechanism.model import Coupling, Joint, JointType, Mechanism
 from ..mechanism.screws import split_elementary
-from .jointgraph import CouplingSpec, FrameSpec, JointGraph, JointSpec
+from .chains import list_chain_joints
+from .jointgraph import CouplingSpec, FrameSpec, JointGraph, JointSpec, join_names
+from .tree import build_spanning_mechanism
 
 
 def convert_to_joint(spec: JointSpec, poses: Mapping[str, Array], *, in_tree: bool, is_closed: bool = False) -> Joint:
@@ -65,6 +67,30 @@ def list_joint_specs(mechanism: Mechanism) -> list[JointSpec]:
         )
         for joint in mechanism.joints.values()
     ]
+
+
+def compute_written_values(robot: Mechanism, poses: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the values of a mechanism's joints where its links have ``poses`` (4, 4), counted from its zero
+    configuration, turns within half a turn, by the names under which the joints are written: one value each, but of
+    balls and free joints a pose (4, 4) as well: of a ball in the frame of its successor, of a free joint in that of
+    the base. Raises ``BadRequest`` if a link has no pose."""
+    given = build_spanning_mechanism(robot)
+    if lacking := [link for link in given.links if link not in poses]:
+        raise BadRequest(f"{robot.name}: link poses of a keyframe: missing", join_names(lacking))
+    values = dict[str, Array]()
+    for spec in list_joint_specs(given):
+        first, second = (poses[end.link] @ end.X for end in spec.ends if end.link is not None)
+        value = find_joint_value(spec, invert_pose(first) @ second)
+        if spec.kind is JointType.SPHERICAL:
+            turned = build_pose(np.zeros(3), given.links[spec.links[1]].pose[:3, :3])
+            values[spec.name] = invert_pose(turned) @ value @ turned
+            value = decompose_rotation(np.eye(3), values[spec.name][:3, :3])
+        elif spec.kind is JointType.FREE:
+            values[spec.name] = invert_pose(poses[given.base]) @ poses[spec.links[1]]
+            continue
+        names = list_chain_joints(spec.name, len(value))
+        values.update({name: np.array([number]) for name, number in zip(names, value, strict=True)})
+    return values
 
 
 def convert_couplings(graph: JointGraph, mechanism: Mechanism) -> tuple[Coupling, ...]:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from ..geometry.vectors import Array
 from ..mechanism.model import Mechanism, Note
 from . import xml
 from .jointgraph import JointGraph
@@ -59,6 +60,8 @@ Read = Callable[[RobotFile], JointGraph]
 """``read`` of a format."""
 Write = Callable[[Mechanism], Written]
 """``write`` of a format."""
+WriteKeyframes = Callable[[str, Path, Mapping[str, Mapping[str, Array]]], dict[Path, str]]
+"""``write_keyframes`` of a format: of a written text, its file, and the joint values of each keyframe."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,8 @@ class FileFormat:
     files that it writes (none: it is only read). ``files`` are all files written where one is named, the robot
     first; ``packed`` turns the text of a file into bytes. ``meshes`` are the extensions of meshes that it can name
     (None: any). ``partner`` is the file on the disk that is read together with one. ``reread``: a written file is read
-    back, and what differs becomes a warning; False if tests show that the writer lists its losses.
+    back, and what differs becomes a warning; False if tests show that the writer lists its losses. ``keyframe_ending``
+    is the extension of the file next to it that holds its keyframes, unless it holds them itself.
 
     A file has the first format that recognises it, in the order of ``rank``.
     """
@@ -81,3 +85,4 @@ class FileFormat:
     meshes: tuple[str, ...] | None = None
     partner: Callable[[Path], Path | None] = field(default=lambda path: None)
     reread: bool = True
+    keyframe_ending: str = ""

@@ -53,6 +53,12 @@ def convert_to_file_joints(at: ClosedConfiguration) -> ClosedConfiguration | Non
     return ClosedConfiguration.of(model, q) if residual <= CLOSURE_RESIDUAL_TOL else None
 
 
+def collect_link_poses(at: ClosedConfiguration) -> dict[str, Array] | None:
+    """Return the poses (4, 4) of the file's links in the base frame, metres; None if the file's joints do not fit."""
+    own = convert_to_file_joints(at)
+    return None if own is None else {link: own.pose(link) for link in own.model.mechanism.links}
+
+
 def read_joints(at: ClosedConfiguration) -> dict[str, tuple[float, ...]]:
     """Return the coordinates of the joints of a robot, as its file has them, at a configuration of it or of its normal
     form; none if the file's joints do not fit."""
@@ -297,3 +303,9 @@ class OfConfiguration:
     def coordinates(self) -> FileCoordinates | None:
         """Coordinates of the file's joints; None without a configuration."""
         return None if self.configuration is None else FileCoordinates.of(self.configuration)
+
+    @property
+    def link_poses(self) -> dict[str, Array] | None:
+        """Poses (4, 4) of the file's links in the base frame, metres; None without a configuration, or if the file's
+        joints do not fit it."""
+        return None if self.configuration is None else collect_link_poses(self.configuration)

@@ -9,7 +9,7 @@ from typing import Any
 
 from ...errors import BadRequest, BadRobotFile, Defect
 from .. import xml
-from ..file_format import FileFormat, Read, RobotFile, Write
+from ..file_format import FileFormat, Read, RobotFile, Write, WriteKeyframes
 from ..jointgraph import JointGraph
 from ..vocabulary import Vocabulary
 
@@ -64,6 +64,15 @@ def get_vocabulary(dialect: str) -> Vocabulary:
     """Return the names of a format that is XML."""
     found: Vocabulary = _find_part(dialect, "NAMES", "names")
     return found
+
+
+def get_keyframe_writer(dialect: str) -> WriteKeyframes:
+    """Return the writer of a format's keyframes. Raises ``BadRequest`` if it has none."""
+    try:
+        write: WriteKeyframes = _find_part(dialect, "write_keyframes", "write")
+    except AttributeError:
+        raise BadRequest("keyframes in this format", dialect, "mjcf, or native with an SRDF file") from None
+    return write
 
 
 def get_writer(dialect: str) -> Write:

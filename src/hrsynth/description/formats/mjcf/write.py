@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 from lxml import etree
@@ -200,3 +201,21 @@ def _build_couplings(robot: Mechanism) -> list[xml.Element]:
         )
         for each in robot.couplings
     ]
+
+
+def write_keyframes(text: str, file: Path, keyframes: Mapping[str, Mapping[str, Array]]) -> dict[Path, str]:
+    """Return the text of a file with a key for each of the joint values, by the names of the joints as written."""
+    root = xml.parse_document(text.encode(), str(file))
+    joints = [joint for tree in root.iterfind("worldbody") for joint in tree.iter("joint", "freejoint")]
+    section = etree.SubElement(root, "keyframe")
+    for name, values in keyframes.items():
+        numbers = [_list_coordinates(joint, values[joint.get("name", "")]) for joint in joints]
+        section.append(xml.create_element("key", name=name, qpos=numerals.format_exact_vector(np.concatenate(numbers))))
+    return {file: xml.format_document(root)}
+
+
+def _list_coordinates(joint: xml.Element, value: Array) -> Array:
+    """Return MuJoCo's coordinates of a joint."""
+    if joint.tag == "freejoint":
+        return np.concatenate([value[:3, 3], convert_to_quaternions(value[:3, :3])])
+    return convert_to_quaternions(value[:3, :3]) if joint.get("type") == "ball" else value

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 from lxml import etree
@@ -17,6 +18,7 @@ from ... import chains, numerals, xml
 from ...annotations import IMAGE, list_camera_attributes
 from ...file_format import Written
 from ...jointgraph import LOOP_TYPES, ORIGIN
+from ...keyframes import SRDF
 from ...numerals import FILE_NUMBER_MAX
 from ...observation_text import list_observe_attributes
 from ...tree import build_spanning_mechanism, list_outward_joints
@@ -266,3 +268,32 @@ def _build_transmissions(motor: Motor | None, names: Sequence[str], all_names: s
         if set(names) <= named <= all_names:
             return found
     return [build_transmission(title, name) for title, name in zip(titles, names, strict=True)]
+
+
+def write_keyframes(text: str, file: Path, keyframes: Mapping[str, Mapping[str, Array]]) -> dict[Path, str]:
+    """Return the text of a URDF and that of an SRDF file with a state for each of the joint values, by the names of the
+    joints as written."""
+    root = xml.parse_document(text.encode(), str(file))
+    names = [
+        joint.get("name", "") for joint in root.iterfind("joint") if joint.get("type") not in ("fixed", "floating")
+    ]
+    joints = [xml.create_element("joint", name=name) for name in names]
+    states = [
+        xml.create_element(
+            "group_state",
+            *(
+                xml.create_element("joint", name=joint, value=numerals.format_exact(float(values[joint][0])))
+                for joint in names
+            ),
+            name=name,
+            group="all",
+        )
+        for name, values in keyframes.items()
+    ]
+    group = xml.create_element("group", *joints, name="all")
+    return {
+        file: text,
+        file.with_suffix(SRDF): xml.format_document(
+            xml.create_element("robot", group, *states, name=root.get("name", ""))
+        ),
+    }
