@@ -5,8 +5,11 @@ from __future__ import annotations
 import contextlib
 import io
 import itertools
+import os
 import re
 import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -103,6 +106,32 @@ def test_the_python_example_runs_and_prints_the_shown_lines():
     with contextlib.redirect_stdout(io.StringIO()) as output:
         exec(compile(code, "README.md", "exec"), {})
     assert output.getvalue().splitlines() == shown
+
+
+@pytest.mark.slow
+def test_the_programs_of_the_pages_have_the_types_that_they_use(tmp_path: Path):
+    """What a type checker of a reader's editor finds in them: nothing is of type None or lacks what is asked of it."""
+    files = dict[str, str]()
+    for page in (ROOT / "README.md", *sorted(PAGES.rglob("*.md"))):
+        code = "\n".join(re.findall(r"^```python\n(.*?)^```", page.read_text("utf-8"), re.DOTALL | re.MULTILINE))
+        if code and "from ." not in code:  # a program, not a part of the package
+            files[f"page_{page.stem.lower()}"] = code
+    assert len(files) > 10
+    for name, code in files.items():
+        (tmp_path / f"{name}.py").write_text(code)
+    (tmp_path / "mypy.ini").write_text(
+        "[mypy]\ncheck_untyped_defs = True\nfollow_imports = silent\nignore_missing_imports = True\n"
+    )
+    paths = [str(tmp_path / f"{name}.py") for name in files]
+    told = subprocess.run(
+        [sys.executable, "-m", "mypy", "--config-file", str(tmp_path / "mypy.ini"), *paths],
+        cwd=tmp_path,
+        env={**os.environ, "MYPYPATH": str(ROOT / "src")},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert told.returncode == 0, told.stdout
 
 
 @pytest.mark.parametrize("page", ["use_pinocchio.md", "poses_by_joints.md"])
