@@ -51,3 +51,14 @@ def test_the_logger_has_each_step(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.DEBUG, "hrsynth"):
         hrsynth.derive("3rrr_m1", seed=1003)
     assert "sampling" in caplog.messages
+
+
+def test_a_stage_with_an_end_tells_how_much_is_done() -> None:
+    """Of a grid each pose once, up to all of them."""
+    stages = list[str]()
+    with hrsynth.on_progress(stages.append):
+        hrsynth.check("3rrr_m1", grid="x=0:0.01:3,y=0:0.01:2", seed=1004)
+    counted = [stage for stage in stages if stage.startswith("poses, ")]
+    assert counted == [f"poses, {number} of 6" for number in range(1, 7)]
+    assert progress.format_step(counted[0], 9) == "poses, 1 of 6"
+    assert progress.format_step("poses", 9) == "poses, step 9"

@@ -4,6 +4,7 @@ nobody listens to shows itself on a terminal and in Jupyter; the logger ``hrsynt
 from __future__ import annotations
 
 import os
+import re
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -19,9 +20,9 @@ _listener: ContextVar[Callable[[str], None] | None] = ContextVar("listener", def
 _part: ContextVar[str] = ContextVar("part", default="")
 
 
-def report(stage: str) -> None:
-    """Report one more step of a stage of the running analysis."""
-    listener, text = _listener.get(), _part.get() + stage
+def report(stage: str, step: int | None = None, total: int | None = None) -> None:
+    """Report one more step of a stage of the running analysis, as ``poses, 3 of 20`` if their total is known."""
+    listener, text = _listener.get(), _part.get() + stage + ("" if total is None else f", {step} of {total}")
     if listener is not None:
         listener(text)
     if (logging := sys.modules.get("logging")) is not None:  # who listens has loaded it
@@ -36,6 +37,11 @@ def report_part(name: str) -> Iterator[None]:
         yield
     finally:
         _part.reset(token)
+
+
+def format_step(stage: str, step: int) -> str:
+    """Return a stage with the number of its step, unless it has one itself."""
+    return stage if re.search(r" of \d+$", stage) else f"{stage}, step {step}"
 
 
 @contextmanager
@@ -54,7 +60,7 @@ def show_progress() -> Iterator[None]:
         steps, now = steps + 1, time.monotonic()
         if now - began > SHOWN_AFTER_S and now - written > SHOWN_AGAIN_S:
             written, is_shown = now, True
-            line = f"{stage}, step {steps}, {now - began:.0f} s"[:SHOWN_COLUMNS_COUNT]
+            line = f"{format_step(stage, steps)}, {now - began:.0f} s"[:SHOWN_COLUMNS_COUNT]
             print(f"\r{line:{SHOWN_COLUMNS_COUNT}}", end="", file=sys.stderr, flush=True)
 
     try:
@@ -72,7 +78,7 @@ def on_progress(listener: Callable[[str], None]) -> Iterator[None]:
     Parameters
     ----------
     listener : callable
-        Function of one text, the name of the stage, such as ``print``.
+        Function of one text, such as ``print``: the name of the stage, as ``poses, 3 of 20`` where it has an end.
 
     Returns
     -------

@@ -215,7 +215,7 @@ def legs(
         samples = samples_of(chosen)
         sets.append(compute_verdict(setup, chosen, samples))
         exact.append(generic.verdict(samples.observation_model.observations))
-        report("sets of legs")
+        report("sets of legs", len(sets), len(tried))
     best = max(each.rank for each in sets)
     smallest = min(len(each.legs) for each in sets if each.rank == best)
     minimal = tuple(each.legs for each in sets if best and each.rank == best and len(each.legs) == smallest)

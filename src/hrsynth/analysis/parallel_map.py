@@ -95,7 +95,7 @@ def map_robots(
     ) as done:
         for found in done:
             answers += found
-            report("questions")
+            report("questions", len(answers), len(groups) * len(asked))
             if errors == RAISE and isinstance(answers[-1], HrsynthError):
                 raise answers[-1]
     return answers

@@ -208,8 +208,8 @@ def _sweep_joints(
     start: ClosedConfiguration, motion: PlatformMotion, grid: Grid
 ) -> Iterator[ClosedConfiguration | None]:
     """Yield the configurations of a grid of joints or motors, each at the end of the straight line from zero."""
-    for asked in grid.requests_at(np.ndindex(grid.shape)):
-        report("poses")
+    for number, asked in enumerate(grid.requests_at(np.ndindex(grid.shape)), 1):
+        report("poses", number, grid.size)
         try:
             yield track_to_joints(start, motion, cast(JointPose, asked))[0]
         except PoseReachFailure:
@@ -238,7 +238,7 @@ def spread(
         if there is not None:
             found[cell] = there
             queue.extend((other, cell) for other in _list_neighbours(cell, shape) if other not in found)
-            report("poses")
+            report("poses", len(found), len(goals))
 
     @cache
     def is_fold(cell: int) -> bool:

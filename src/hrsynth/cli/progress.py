@@ -12,6 +12,7 @@ from collections import deque
 from datetime import timedelta
 from typing import Self
 
+from ..progress import format_step
 from .colour import print_text, replace_line
 
 BUILD_SPEED_WINDOW_S = 600.0
@@ -87,7 +88,7 @@ class Progress:
             if self._terminal:
                 self._write()
             else:
-                print_text(f"hrsynth: {self._what}, step {self._done}, {passed:.0f} s", err=True)
+                print_text(f"hrsynth: {format_step(self._what, self._done)}, {passed:.0f} s", err=True)
             self._arm(AGAIN if self._terminal else passed)
             self._timer.start()
 
@@ -97,7 +98,7 @@ class Progress:
 
     def _line(self, now: float) -> str:
         if not self._total:
-            return f"{self._what} step {self._done} {_format_clock(now - self._began)}"
+            return f"{format_step(self._what, self._done)} {_format_clock(now - self._began)}"
         began, before = self._known[0]
         left = "-:--:--"
         if self._done > before:

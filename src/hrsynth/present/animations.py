@@ -59,10 +59,10 @@ def draw_animation(found: Servo) -> bytes:
     wanted = _convert_to_light(stage.picture(found.target.pose))
     paper = np.where(_find_background(wanted)[..., None], 1.0, 1.0 - DESIRED_IMAGE_BRIGHTNESS_FRACTION * (1.0 - wanted))
     sheet = Sheet(found)
-    frames = []
+    frames = list[Any]()
     moments = _choose_moments(np.array([at.pose(setup.motion.link)[:3, 3] for at in configurations]), found.errors)
     for number, words in zip(moments, list_captions(found, moments), strict=True):
-        report("frames")
+        report("frames", len(frames) + 1, len(moments))
         seen = _convert_to_light(stage.picture(configurations[number].pose))
         frame = sheet.at(number, words)
         frame[:, : seen.shape[1]] = frame[:, : seen.shape[1]] * np.where(_find_background(seen)[..., None], paper, seen)

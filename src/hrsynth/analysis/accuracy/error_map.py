@@ -224,7 +224,7 @@ class Mapper(Value):
         size = -(-count // max(1, count // ERROR_MAP_CHUNK_COUNT))
         compiled = self.may_use_numba(count, cones)
         for start in range(0, count, size):
-            report("poses")
+            report("poses", start, count)
             here = grid.places(start, start + size) if places is None else places[start : start + size]
             yield self.part(grid, here, cones, compiled)
 
@@ -245,7 +245,7 @@ class Mapper(Value):
         table = np.full((5, len(found)), np.nan)
         for i, at in enumerate(found):
             if at is not None and find_invisible(at, self.observation_model) is None:
-                report("errors")
+                report("errors", i + 1, len(found))
                 rates, twists = compute_rates_and_twists(at, self.observation_model)
                 table[:4, i] = bound_pose_errors(at, self.observation_model, self.blur).ravel()
                 table[4, i] = _compute_smallest_change(rates, twists, at.model.length)

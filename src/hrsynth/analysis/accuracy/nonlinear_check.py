@@ -69,8 +69,8 @@ def sample_true_errors(
     home = at.pose(motion.link)
     position, orientation, usual = 0.0, 0.0, compute_smallest_value(at, observation_model)
     least, ended, not_found = usual, [], 0
-    for way in ways:
-        report("samples")
+    for number, way in enumerate(ways, 1):
+        report("samples", number, len(ways))
         fit = track_best_fits(at, observation_model, partial(wrong, way))
         least = min(least, fit.weakest)
         if fit.outcome == ENDS:

@@ -142,7 +142,7 @@ def prove_branch(
             _list_first_cells(grid, q0, coarsest, max_cells),
         ).run(np.inf if time_limit is None else time_limit)
         grown.append(growth)
-        report("parts")
+        report("parts", len(grown), len(parts))
     back, regular = prove_injective_box(system, grown)
     for part, growth in zip(parts, grown, strict=True):
         if growth.part is not part:

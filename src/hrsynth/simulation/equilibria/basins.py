@@ -470,9 +470,9 @@ class BasinSearch:
         """Return the results of pieces of work, in their order."""
         jobs, found = min(self.jobs, len(works)), []
         for each in run_shared(works, jobs):
-            if jobs > 1:
-                report("run")
             found.append(each)
+            if jobs > 1:
+                report("runs", len(found), len(works))
         return found
 
 
