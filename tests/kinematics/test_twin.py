@@ -287,3 +287,16 @@ def test_motors_on_a_ball_at_which_a_loop_is_cut_hold_both_links_together() -> N
     assert len(driven) == 6
     ranks = [np.linalg.matrix_rank(rows, tol=AGREE) for rows in (driven, turns, np.vstack((driven, turns)))]
     assert ranks[0] == ranks[1] == ranks[2] >= 3
+
+
+@pytest.mark.some(4)
+@pytest.mark.parametrize("name", ROBOTS)
+def test_whole_turns_are_removed_and_nothing_moves(name: str):
+    model = setting_of(name).all_samples.model
+    q = model.integrate(model.q0, np.random.default_rng(5).uniform(-20, 20, model.nv))
+    bare = model.remove_turns(q)
+    for link in model.mechanism.links:
+        assert np.allclose(model.pose(q, link), model.pose(bare, link), atol=1e-9)
+    step = model.difference(model.q0, bare)
+    turned = [joint for joint in model.mechanism.joints.values() if joint.type in "RU" and joint.in_tree]
+    assert all(abs(step[list(model.coordinates[joint.name])]).max() <= np.pi for joint in turned)

@@ -357,6 +357,16 @@ class PinocchioModel:
         """The configuration that ``step`` (nv) leads to from ``q``."""
         return pin.integrate(self.model, q, step)
 
+    def remove_turns(self, q: Array) -> Array:
+        """Return the configuration of the same link poses whose rotations are within half a turn of zero; coupled
+        joints stay."""
+        step, turns = self.difference(self.q0, q), np.zeros(self.nv)
+        for joint, _, _ in self._parts:
+            if joint.type is not JointType.PRISMATIC and joint.name not in self.mechanism.coupled_joints:
+                places = list(self.coordinates[joint.name])[len(self.coordinates[joint.name]) - len(joint.axes) :]
+                turns[places] = np.round(step[places] / (2 * np.pi))
+        return self.integrate(q, -2 * np.pi * turns)
+
     def is_normalized(self, q: Array) -> bool:
         """Return True if all rotations in ``q`` are unit quaternions."""
         return bool(pin.isNormalized(self.model, q, GEOMETRY_DIFFERENCE_TOL))

@@ -267,7 +267,7 @@ def _search(
         if residual > CLOSURE_RESIDUAL_TOL:
             continue
         closed, quiet = closed + 1, quiet + 1
-        there = ClosedConfiguration.of(model, q)
+        there = ClosedConfiguration.of(model, model.remove_turns(q))
         if compute_relation(there, observation_model).rank < rank:
             loose += 1
             continue

@@ -109,7 +109,7 @@ def search(goal: ClosedConfiguration, observation_model: ObservationModel, bodie
                 _add_near(near, model, q, residual, bodies, observation_model)
             continue
         closed, quiet = closed + 1, quiet + 1
-        at = ClosedConfiguration.of(model, q)
+        at = ClosedConfiguration.of(model, model.remove_turns(q))
         poses = _poses(at, bodies)
         known = next(
             (
@@ -161,7 +161,7 @@ def _add_near(
     q, left = solve(model, q, tolerance=CLOSURE_SOLVER_TOL)
     if left > CLOSURE_RESIDUAL_TOL:
         return
-    at = ClosedConfiguration.of(model, q)
+    at = ClosedConfiguration.of(model, model.remove_turns(q))
     poses = _poses(at, bodies)
     if all(bodies_apart(each.bodies, poses, observation_model, model.length) > NEAR_MODE_DISTANCE_MAX for each in near):
         near.append(FoundMode(at, poses, residual, 1))
