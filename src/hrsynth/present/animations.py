@@ -41,7 +41,7 @@ CROSSING_CAPTION_FRAMES_COUNT = 3
 GIF_COLOURS_COUNT = 32
 """Colours of the file."""
 WATCHED = np.array([int(palette.get_colour("observed")[i : i + 2], 16) / 255 for i in (1, 3, 5)])
-CAPTION_LINE_CHARACTERS_MAX = 38
+CAPTION_LINE_CHARACTERS_MAX = 36
 """Letters of a line of words."""
 
 
@@ -129,16 +129,17 @@ class Sheet:
         )
         figure.text(0.015, 0.965, "camera image", fontsize=12, va="center")
         self.words = figure.text(left, 0.79, "", fontsize=14, va="top", linespacing=1.35)
-        figure.text(left, 0.53, "■", fontsize=11, va="center", color=palette.get_colour("observed"))
+        figure.text(left, 0.55, "■", fontsize=11, va="center", color=palette.get_colour("observed"))
         figure.text(
-            left + 0.016, 0.53, f"observed {name_all('leg', found.setup.labels)}; pale: goal", fontsize=10, va="center"
+            left + 0.016, 0.55, f"observed {name_all('leg', found.setup.labels)}; pale: goal", fontsize=10, va="center"
         )
         self.marks: list[Any] = []
         for bottom, values, label in (
-            (0.29, found.errors.max(axis=1), "largest direction error"),
-            (0.075, found.track.smallest, "singularity distance"),
+            (0.38, found.errors.max(axis=1), "largest direction error"),
+            (0.225, 1e3 * np.linalg.norm(found.way - found.goal_position, axis=1), "distance from the goal (mm)"),
+            (0.07, found.track.smallest, "singularity distance"),
         ):
-            place = figure.add_axes((left + 0.025, bottom, wide - 0.025, 0.135))
+            place = figure.add_axes((left + 0.025, bottom, wide - 0.025, 0.09))
             place.plot(self.times, values, color="0.35")
             place.set(xlim=(0, find_end_time(found) or 1.0), ylim=(0, None))
             place.set_title(label, loc="left", fontsize=10)
