@@ -24,6 +24,7 @@ from .plots import (
     in_style,
     label_curve,
     label_joints,
+    list_limit_entries,
     make_legend_entry,
     make_missing_entry,
     make_panels,
@@ -85,11 +86,12 @@ def draw_distance_map(found: Check, paper: Paper = PNG) -> bytes:
     numbers = np.array([np.nan if value is None else value for value in grid.values("type2")]).reshape(grid.grid.shape)
     states, axes = np.array(grid.states).reshape(grid.grid.shape), label_joints(grid.grid, found.setup.robot)
     figure = (
-        _draw_distance_curve(axes, numbers, states, paper)
+        _draw_distance_curve(axes, numbers, states, grid.beyond, paper)
         if axes.ndim == 1
-        else _draw_distance_maps(axes, numbers, states, found.setup.motion, paper)
+        else _draw_distance_maps(axes, numbers, states, grid.beyond, found.setup.motion, paper)
     )
     entries = [make_missing_entry()] if UNREACHABLE in grid.states else []
+    entries += list_limit_entries(grid.beyond)
     entries += _draw_robot(figure, axes, found.setup)
     entries += [
         make_legend_entry(label, linestyle="", marker=mark, color=palette.get_colour("step4"), markeredgecolor="white")
@@ -113,7 +115,12 @@ def _draw_robot(figure: Any, grid: Grid, setup: ObservedRobot) -> list[Any]:
 
 
 def _draw_distance_maps(
-    grid: Grid, numbers: Array, states: NDArray[np.str_], motion: PlatformMotion, paper: Paper
+    grid: Grid,
+    numbers: Array,
+    states: NDArray[np.str_],
+    beyond: NDArray[np.bool_] | None,
+    motion: PlatformMotion,
+    paper: Paper,
 ) -> Any:
     from matplotlib.colors import LogNorm
 
@@ -122,6 +129,7 @@ def _draw_distance_maps(
     norm = LogNorm(low, high)
     for (place, distances), (_, state) in zip(made.layers(numbers), made.layers(states), strict=True):
         _draw_distances(place, made.plane, np.maximum(distances, low), state, norm)
+    made.mark_beyond(beyond)
     made.scale(norm, "viridis", VALUE, "min" if np.nanmin(numbers) < low else "neither")
     return made.figure
 
@@ -143,7 +151,9 @@ def _draw_distances(place: Any, plane: MapPlane, numbers: Array, states: NDArray
         )
 
 
-def _draw_distance_curve(grid: Grid, numbers: Array, states: NDArray[np.str_], paper: Paper) -> Any:
+def _draw_distance_curve(
+    grid: Grid, numbers: Array, states: NDArray[np.str_], beyond: NDArray[np.bool_] | None, paper: Paper
+) -> Any:
     ((name, values),) = grid.axes
     x = convert_to_ticks(name, values)
     figure, (place,) = make_panels(1, 1, 7.0, 4.6, paper)
@@ -164,7 +174,7 @@ def _draw_distance_curve(grid: Grid, numbers: Array, states: NDArray[np.str_], p
             linewidth=0.6,
             zorder=3,
         )
-    label_curve(place, name, x, states == UNREACHABLE, VALUE)
+    label_curve(place, name, x, states == UNREACHABLE, VALUE, beyond)
     return figure
 
 
@@ -183,11 +193,13 @@ def check_table(found: Check) -> bytes:
     grid = found.grid
     poses = grid.grid.requests_at(np.ndindex(grid.grid.shape))
     given = [*poses[0].given]
-    rows: list[list[Any]] = [[*given, "state", *MEASURES]]
-    columns = [grid.values(measure) for measure in MEASURES]
+    columns = {measure: grid.values(measure) for measure in MEASURES}
+    if grid.beyond is not None:
+        columns["beyond_limits"] = tuple(grid.beyond.ravel().tolist())
+    rows: list[list[Any]] = [[*given, "state", *columns]]
     for i, (pose, state) in enumerate(zip(poses, grid.states, strict=True)):
         values = ["/".join(map(repr, pose.given[name])) for name in given]
-        rows.append([*values, state, *("" if column[i] is None else repr(column[i]) for column in columns)])
+        rows.append([*values, state, *("" if column[i] is None else repr(column[i]) for column in columns.values())])
     return encode_csv(rows)
 
 
@@ -226,7 +238,9 @@ def draw_locus_map(found: Singularity, drawn: Locus, paper: Paper = PNG) -> byte
         if field is not None:
             entries.insert(0, _draw_locus_curve(place, plane, field, name))
     plane.finish(place, plane.x, plane.y)
-    entries += [Patch(facecolor="0.5", label="darker: closer to Type 2"), *borders]
+    entries += [Patch(facecolor="0.5", label="darker: closer to Type 2"), *borders, *list_limit_entries(drawn.beyond)]
+    if drawn.beyond is not None:
+        plane.beyond_limits(place, drawn.beyond)
     if not np.isfinite(drawn.hidden.type2).all():
         entries.append(make_missing_entry())
     entries += plane.robot(figure, found.setup.all_samples.start)
@@ -323,6 +337,7 @@ def _draw_error_maps(
             if not flat and field.determinant is not None:
                 locus |= _draw_loss(place, plane, field.determinant[..., k])
         made.scale(norm, ERRORS, label, "max" if np.nanmax(values) > high else "neither", number)
+    made.mark_beyond(field.beyond)
     return made.figure, (flat and _locus(field, [place for (place,) in made.maps], plane)) or locus
 
 
@@ -372,7 +387,7 @@ def _draw_error_curves(field: ErrorField, grid: Grid, shown: list[tuple[Array, s
         place.minorticks_off()
         ticks = round_ticks(*_choose_scale_ends(np.where(np.isfinite(errors), errors, np.nan), np.inf))
         place.set_yticks(list(ticks), labels=format_ticks(ticks))
-        label_curve(place, name, x, np.isnan(errors), label)
+        label_curve(place, name, x, np.isnan(errors), label, field.beyond)
     return figure, False
 
 
@@ -380,7 +395,7 @@ def _list_error_entries(field: ErrorField, locus: bool) -> list[Any]:
     """Return the legend entries of white lines or points, black lines and hatching."""
     from matplotlib.patheffects import Normal, Stroke
 
-    entries: list[Any] = []
+    entries = list_limit_entries(field.beyond)
     if locus:
         outlined = [Stroke(linewidth=3.4, foreground="black"), Normal()]
         spots = field.determinant is None and field.curve is None
@@ -408,8 +423,11 @@ def format_error_table(found: Accuracy) -> Iterator[bytes]:
     singularities."""
     field = found.field
     assert field is not None
-    yield ",".join((*field.grid.names, "position_mm", "orientation_deg")).encode() + b"\n"
-    columns = 1e3 * field.position.ravel(), np.degrees(field.orientation.ravel())
+    columns = [1e3 * field.position.ravel(), np.degrees(field.orientation.ravel())]
+    names = [*field.grid.names, "position_mm", "orientation_deg"]
+    if field.beyond is not None:
+        names, columns = [*names, "beyond_limits"], [*columns, field.beyond.ravel()]
+    yield ",".join(names).encode() + b"\n"
     for place, *errors in zip(
         product(*(values.tolist() for _, values in field.grid.axes)),
         *(column.tolist() for column in columns),

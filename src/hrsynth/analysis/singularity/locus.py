@@ -16,12 +16,13 @@ from ...errors import BadRequest, NoReachablePose, PoseReachFailure
 from ...geometry.so3 import turn_about
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.limits import mark_beyond_limits
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.velocity_relation import ObservationModel
 from ...mechanism import Mechanism
 from ...mechanism.pose import Grid, Pose, convert_to_pose
 from ...progress import report
-from ...records import As, Number, Recorded, Shown, recorded
+from ...records import BEYOND_LIMITS, As, Number, Recorded, Shown, Table, recorded
 from ...results import Value
 from ...tolerances import RELATION_ANGLE_TOL, SINGULAR_POSE_DISTANCE_TOL
 from ..measured import MeasuredRobot
@@ -71,6 +72,7 @@ class Locus(Value):
     grid: Grid
     hidden: Recorded[SingularityMap]
     real: Recorded[SingularityMap | None]
+    beyond: Annotated[NDArray[np.bool_] | None, Table | None, As("beyond_limits", optional=True), BEYOND_LIMITS] = None
 
     @property
     @recorded()
@@ -175,7 +177,13 @@ def _compute_both_loci(hidden: MeasuredRobot, real: MeasuredRobot | None, plane:
             tables[0], condition.signed, tables[1], tables[2], spots, curve, condition.never, not measured.unexamined
         )
 
-    return Locus(grid, field(hidden), None if real is None else field(real))
+    beyond = mark_beyond_limits(configurations)
+    return Locus(
+        grid,
+        field(hidden),
+        None if real is None else field(real),
+        None if beyond is None else beyond.reshape(grid.shape),
+    )
 
 
 def choose_plane_grid(
