@@ -102,7 +102,7 @@ def draw_distance_map(found: Check, paper: Paper = PNG) -> bytes:
     draw_heading(
         figure,
         f"{found.setup.robot.name}: Type 2 distance, legs {', '.join(found.setup.labels)} observed",
-        grid.grid.fixed,
+        grid.grid,
     )
     return print_figure(figure, paper)
 
@@ -203,18 +203,22 @@ def check_table(found: Check) -> bytes:
     return encode_csv(rows)
 
 
-def require_plane(setup: ObservedRobot, plane: Pose | str | None = None, **_: Any) -> None:
+def require_plane(
+    setup: ObservedRobot, plane: Pose | str | None = None, grid: Grid | str | None = None, **_: Any
+) -> None:
     """Raise the error of the plane, or the reason why there is no locus."""
     from ..analysis.singularity.locus import require_plane
 
-    require_plane(setup, plane)
+    require_plane(setup, plane, grid)
 
 
-def compute_singular_locus(found: Singularity, plane: Pose | str | None, steps: int, seed: int) -> Locus:
-    """Compute the Type 2 locus over a plane of poses."""
+def compute_singular_locus(
+    found: Singularity, plane: Pose | str | None, grid: Grid | str | None, steps: int, seed: int
+) -> Locus:
+    """Compute the Type 2 locus over a plane of poses, or over a grid."""
     from ..analysis.singularity.locus import compute_locus
 
-    return compute_locus(found.setup, plane=plane, steps=steps, seed=seed)
+    return compute_locus(found.setup, plane=plane, grid=grid, steps=steps, seed=seed)
 
 
 @in_style
@@ -222,7 +226,7 @@ def draw_locus_map(found: Singularity, drawn: Locus, paper: Paper = PNG) -> byte
     """Draw the Type 2 loci of the hidden and the real robot over a plane, the Type 1 boundary and unreached poses."""
     from matplotlib.patches import Patch
 
-    plane = MapPlane.of(drawn.grid.axes, found.setup.motion, 0.4, 1.6)
+    plane = MapPlane.of(label_joints(drawn.grid, found.setup.robot).axes, found.setup.motion, 0.4, 1.6)
     figure, (place,) = make_panels(1, 1, 7.2, 6.0 * plane.tall + 1.6, paper)
     shade = np.log10(np.maximum(drawn.hidden.type2, DARKEST_SINGULAR_VALUE_MAX))
     plane.cells(
@@ -248,7 +252,7 @@ def draw_locus_map(found: Singularity, drawn: Locus, paper: Paper = PNG) -> byte
     draw_heading(
         figure,
         f"{found.setup.robot.name}: Type 2 singularities, legs {', '.join(found.setup.labels)} observed",
-        drawn.grid.fixed,
+        drawn.grid,
     )
     return print_figure(figure, paper)
 
@@ -269,20 +273,24 @@ def _draw_locus_curve(place: Any, plane: MapPlane, field: SingularityMap, name: 
 
 
 def _draw_boundary(place: Any, plane: MapPlane, drawn: Locus) -> list[Any]:
-    """Draw the boundary of the reached poses, coloured near a Type 1 singularity; return the entries of the legend."""
+    """Draw the boundary of the reached poses, coloured near a Type 1 singularity, of motors and joints near a Type 2
+    singularity of the real robot; return the entries of the legend."""
     reached = np.isfinite(drawn.hidden.type2)
     padded = np.pad(reached, 1, mode="edge")
     inside = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
     border = reached & ~inside
     near = np.zeros_like(reached)
-    for field in (drawn.hidden, drawn.real):
-        if field is not None:
-            padded = np.pad(np.where(reached, field.type1, np.inf), 2, constant_values=np.inf)
-            around = [padded[i : i + reached.shape[0], j : j + reached.shape[1]] for i in range(5) for j in range(5)]
-            near |= np.min(around, axis=0) < TYPE_1_BOUNDARY_FRACTION * np.nanmedian(field.type1)
+    joints, real = bool(drawn.grid.joints), drawn.real
+    kind = "Type 2 boundary of the real robot" if joints else "Type 1 boundary"
+    distances = [] if joints else [drawn.hidden.type1]
+    distances += [] if real is None else [real.type2 if joints else real.type1]
+    for distance in distances:
+        padded = np.pad(np.where(reached, distance, np.inf), 2, constant_values=np.inf)
+        around = [padded[i : i + reached.shape[0], j : j + reached.shape[1]] for i in range(5) for j in range(5)]
+        near |= np.min(around, axis=0) < TYPE_1_BOUNDARY_FRACTION * np.nanmedian(distance)
     entries = []
     for cells, colour, words in (
-        (border & near, palette.SERIES[1], "Type 1 boundary"),
+        (border & near, palette.SERIES[1], kind),
         (border & ~near, "black", "other workspace boundary"),
     ):
         i, j = np.nonzero(cells)
@@ -314,7 +322,7 @@ def draw_error_map(found: Accuracy, paper: Paper = PNG) -> bytes:
     plots.draw_legend(figure, _list_error_entries(field, locus) + _draw_robot(figure, axes, found.setup), paper)
     legs = ", ".join(f"{o.leg} {found.bounds.words(i, o)}" for i, o in enumerate(found.setup.observed))
     what = "observed legs" if all(o.is_segment_direction for o in found.setup.observed) else "observed"
-    draw_heading(figure, f"{found.setup.robot.name}: largest errors\n{what}: {legs}", field.grid.fixed, "; ")
+    draw_heading(figure, f"{found.setup.robot.name}: largest errors\n{what}: {legs}", field.grid, "; ")
     return print_figure(figure, paper)
 
 
@@ -375,7 +383,8 @@ def _draw_pieces(place: Any, plane: MapPlane, curve: Array, **style: Any) -> Non
     """Draw pieces (k, 2, 2) of a curve."""
     from matplotlib.collections import LineCollection
 
-    place.add_collection(LineCollection(list(np.stack(plane.at(curve[..., 0], curve[..., 1]), axis=-1)), **style))
+    pieces = np.stack(plane.spots(curve.reshape(-1, 2)), axis=-1).reshape(curve.shape)
+    place.add_collection(LineCollection(list(pieces), **style))
 
 
 def _draw_error_curves(field: ErrorField, grid: Grid, shown: list[tuple[Array, str]], paper: Paper) -> tuple[Any, bool]:

@@ -17,7 +17,7 @@ from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import PlatformMotion
 from ..mechanism import Mechanism
-from ..mechanism.pose import ANGLES, Grid, JointPose, Pose
+from ..mechanism.pose import ANGLES, TURNS, Grid, JointPose, Pose
 from ..results import Result
 from .figure_format import BESIDE, PNG, Paper, draw_legend_within, print_figure
 from .skeleton import trace_leg_outlines, trace_link_outline
@@ -296,9 +296,9 @@ def label_curve(
     place.grid()
 
 
-def draw_heading(figure: Any, text: str, fixed: Pose | JointPose, before: str = "\n") -> None:
-    """Set the title, followed by the fixed coordinates, angles in degrees."""
-    words = describe_pose(fixed)
+def draw_heading(figure: Any, text: str, grid: Grid, before: str = "\n") -> None:
+    """Set the title, followed by the coordinates that a grid keeps, angles in degrees."""
+    words = grid.fixed_text if {*TURNS} & {*grid.names} else describe_pose(grid.fixed)
     figure.suptitle(text + (f"{before}{words}" if words else ""))
 
 

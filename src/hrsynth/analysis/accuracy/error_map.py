@@ -283,7 +283,7 @@ class Mapper(Value):
             lambda: None,
             lambda: table[4],
             _compute_bound_gap(table[:2], table[2:4]),
-            partial(plane.curve, found) if grid.ndim == 2 and not grid.joints else None,
+            partial(plane.curve, found) if grid.ndim == 2 else None,
             mark_beyond_limits(found),
         )
 
