@@ -45,6 +45,7 @@ Table = list[Any]
 SIMPLE: dict[Any, str] = {str: "string", int: "integer", float: "number", bool: "boolean", NoneType: "null"}
 ANGLE = "the largest principal angle between two velocity relations (rad)"
 GAP = "the smallest ratio of a singular value that counts to one that does not"
+BEYOND_LIMITS = "true where joints are beyond their limits"
 """Descriptions of numbers in several records."""
 Word = Literal["controllable", "partially controllable", "uncontrollable", "nothing to control", "rigid", "flexible"]
 """Verdicts on the observations of a robot, or of a formation."""

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..batch.pose_continuation import explain_grid_dependence, sweep
 from ..errors import (
@@ -19,6 +21,7 @@ from ..errors import (
     UndecidedRank,
 )
 from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.limits import mark_beyond_limits
 from ..kinematics.operation_modes import SAMPLE_PATH_STEPS_COUNT, choose_firmest, require_motions
 from ..kinematics.pinocchio_model import PinocchioModel
 from ..kinematics.walking import walk_randomly
@@ -26,7 +29,7 @@ from ..mechanism import Mechanism
 from ..mechanism.pose import Grid, PoseLike, parse_poses
 from ..options import option
 from ..progress import report
-from ..records import FLAT, GAP, As, Recorded, Shown, Table, recorded
+from ..records import BEYOND_LIMITS, FLAT, GAP, OPTIONAL, As, Recorded, Shown, Table, recorded
 from ..results import Result, Value
 from ..tolerances import RANK_GAP_MIN
 from .analysis_declaration import analysis
@@ -61,6 +64,12 @@ class GridCheck(Value):
         """One of ``MEASURES`` at each cell; None where the pose is not reached or the value is infinite."""
         return tuple(None if each is None else each.distances.to_dict()[measure] for each in self.postures)
 
+    @cached_property
+    def beyond(self) -> NDArray[np.bool_] | None:
+        """Mask of the cells at which joints are beyond their limits, in the grid's shape; None without limits."""
+        marked = mark_beyond_limits([None if posture is None else posture.configuration for posture in self.postures])
+        return None if marked is None else marked.reshape(self.grid.shape)
+
     def nested(self, values: Sequence[Any]) -> Table:
         """A value of each cell, nested in the order of ``axes``."""
         told: Table = np.array(values, dtype=object).reshape(self.grid.shape).tolist()
@@ -73,6 +82,7 @@ class GridCheck(Value):
     condition = Shown(Table, lambda self: self.nested(self.values("condition")))
     mm_per_degree = Shown(Table, lambda self: self.nested(self.values("mm_per_degree")))
     degrees_per_degree = Shown(Table, lambda self: self.nested(self.values("degrees_per_degree")))
+    beyond_limits = Shown(Table | None, lambda self: self.beyond, OPTIONAL, BEYOND_LIMITS)
 
 
 class UnreachedPose(NamedTuple):

@@ -73,6 +73,16 @@ def track_to_pose(
     return found
 
 
+def track_to_request(
+    start: ClosedConfiguration, observation_model: ObservationModel, asked: Pose | JointPose, motion: PlatformMotion
+) -> ClosedConfiguration:
+    """The configuration at a pose by its parts, or by joints or motors, that small steps lead to from ``start``; raises
+    as :func:`track_to_pose` and :func:`.track_to_joints`."""
+    if isinstance(asked, JointPose):
+        return track_to_joints(start, motion, asked)[0]
+    return track_to_pose(start, observation_model, asked, motion)
+
+
 def explain_dependence(
     start: ClosedConfiguration, motion: PlatformMotion, goal: PoseTask, what: str, stuck: bool = False
 ) -> str | None:

@@ -275,6 +275,9 @@ class Rod(ClosedFormLeg):
     def oriented(self, p: Array, R: Array, u: Array, carried: Array) -> ClosedFormLeg | None:
         tip = self.tip.value(p, R)
         rods = np.array(self.along(tip, carried)) / (self.rod or 1.0)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            if not np.any(self.solve(tip, 1.0)[0] > HIDDEN_ROBOT_RESIDUAL_TOL**2):
+                return None  # a tip that is always on the leg's axis decides nothing
         for sense in (1.0, -1.0):
             if np.max(np.abs(sense * rods - u)) <= 10 * HIDDEN_ROBOT_RESIDUAL_TOL:
                 return replace(self, sense=sense, mode=float(self.modes(tip[:1], carried[:1])[0]))

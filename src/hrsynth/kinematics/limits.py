@@ -9,6 +9,7 @@ from itertools import combinations, product
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..geometry import lines
 from ..geometry.balls import Field, enclose_around
@@ -117,6 +118,25 @@ def list_joints_beyond(model: PinocchioModel, q: Array, joints: Sequence[str] | 
         for name, value in list_limited_coordinates(model, q).items()
         if mechanism.stops[name].joint in joints and is_excluded(mechanism, name, value, value)
     ]
+
+
+def has_limits(mechanism: Mechanism) -> bool:
+    """Return True if a joint has limits."""
+    return bool(mechanism.stops or mechanism.tilt_limits)
+
+
+def is_within_limits(at: ClosedConfiguration) -> bool:
+    """Return True if no joint is beyond its limits; without limits, always."""
+    return not list_joints_beyond(at.model, at.q)
+
+
+def mark_beyond_limits(configurations: Sequence[ClosedConfiguration | None]) -> NDArray[np.bool_] | None:
+    """Return the mask of configurations with joints beyond their limits, false where there is none; None without
+    limits."""
+    first = next((at for at in configurations if at is not None), None)
+    if first is None or not has_limits(first.model.mechanism):
+        return None
+    return np.array([at is not None and not is_within_limits(at) for at in configurations])
 
 
 def is_proved_outside(model: PinocchioModel, q: Array, bodies: Iterable[str], within: float) -> bool:

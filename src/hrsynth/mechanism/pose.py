@@ -469,10 +469,14 @@ class Grid(Value):
 
     def requests_at(self, cells: Iterable[Sequence[int]]) -> tuple[Pose | JointPose, ...]:
         """Return the poses of cells as they are requested, of joints too."""
-        if not isinstance(held := self.fixed, JointPose):
-            return self.poses_at(cells)
-        varied = (tuple((name, (x,)) for name, x in zip(self.names, v, strict=True)) for v in self._list_values(cells))
-        return tuple(replace(held, values=(*values, *held.values)) for values in varied)
+        return tuple(map(self.request, self._list_values(cells)))
+
+    def request(self, values: Sequence[float]) -> Pose | JointPose:
+        """Return the pose with these values of what varies, as it is requested."""
+        if not isinstance(self.fixed, JointPose):
+            return self.pose(values)
+        varied = tuple((name, (value,)) for name, value in zip(self.names, values, strict=True))
+        return replace(self.fixed, values=(*varied, *self.fixed.values))
 
     def _list_values(self, cells: Iterable[Sequence[int]]) -> Iterator[list[float]]:
         for cell in cells:

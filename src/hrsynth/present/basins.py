@@ -140,7 +140,7 @@ def draw_basins(found: Basins, paper: Paper = PNG) -> bytes:
         figure,
         f"{found.setup.robot.name}, {word}{', '.join(found.setup.labels)} observed: outcome of each "
         f"start\ngoal {plots.describe_pose(found.goal)}",
-        grid.fixed,
+        grid,
         "; starts: ",
     )
     return print_figure(figure, paper)

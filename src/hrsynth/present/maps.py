@@ -24,6 +24,7 @@ from .plots import (
     in_style,
     label_curve,
     label_joints,
+    list_limit_entries,
     make_legend_entry,
     make_missing_entry,
     make_panels,
@@ -85,11 +86,12 @@ def draw_distance_map(found: Check, paper: Paper = PNG) -> bytes:
     numbers = np.array([np.nan if value is None else value for value in grid.values("type2")]).reshape(grid.grid.shape)
     states, axes = np.array(grid.states).reshape(grid.grid.shape), label_joints(grid.grid, found.setup.robot)
     figure = (
-        _draw_distance_curve(axes, numbers, states, paper)
+        _draw_distance_curve(axes, numbers, states, grid.beyond, paper)
         if axes.ndim == 1
-        else _draw_distance_maps(axes, numbers, states, found.setup.motion, paper)
+        else _draw_distance_maps(axes, numbers, states, grid.beyond, found.setup.motion, paper)
     )
     entries = [make_missing_entry()] if UNREACHABLE in grid.states else []
+    entries += list_limit_entries(grid.beyond)
     entries += _draw_robot(figure, axes, found.setup)
     entries += [
         make_legend_entry(label, linestyle="", marker=mark, color=palette.get_colour("step4"), markeredgecolor="white")
@@ -100,7 +102,7 @@ def draw_distance_map(found: Check, paper: Paper = PNG) -> bytes:
     draw_heading(
         figure,
         f"{found.setup.robot.name}: Type 2 distance, legs {', '.join(found.setup.labels)} observed",
-        grid.grid.fixed,
+        grid.grid,
     )
     return print_figure(figure, paper)
 
@@ -113,7 +115,12 @@ def _draw_robot(figure: Any, grid: Grid, setup: ObservedRobot) -> list[Any]:
 
 
 def _draw_distance_maps(
-    grid: Grid, numbers: Array, states: NDArray[np.str_], motion: PlatformMotion, paper: Paper
+    grid: Grid,
+    numbers: Array,
+    states: NDArray[np.str_],
+    beyond: NDArray[np.bool_] | None,
+    motion: PlatformMotion,
+    paper: Paper,
 ) -> Any:
     from matplotlib.colors import LogNorm
 
@@ -122,6 +129,7 @@ def _draw_distance_maps(
     norm = LogNorm(low, high)
     for (place, distances), (_, state) in zip(made.layers(numbers), made.layers(states), strict=True):
         _draw_distances(place, made.plane, np.maximum(distances, low), state, norm)
+    made.mark_beyond(beyond)
     made.scale(norm, "viridis", VALUE, "min" if np.nanmin(numbers) < low else "neither")
     return made.figure
 
@@ -143,7 +151,9 @@ def _draw_distances(place: Any, plane: MapPlane, numbers: Array, states: NDArray
         )
 
 
-def _draw_distance_curve(grid: Grid, numbers: Array, states: NDArray[np.str_], paper: Paper) -> Any:
+def _draw_distance_curve(
+    grid: Grid, numbers: Array, states: NDArray[np.str_], beyond: NDArray[np.bool_] | None, paper: Paper
+) -> Any:
     ((name, values),) = grid.axes
     x = convert_to_ticks(name, values)
     figure, (place,) = make_panels(1, 1, 7.0, 4.6, paper)
@@ -164,7 +174,7 @@ def _draw_distance_curve(grid: Grid, numbers: Array, states: NDArray[np.str_], p
             linewidth=0.6,
             zorder=3,
         )
-    label_curve(place, name, x, states == UNREACHABLE, VALUE)
+    label_curve(place, name, x, states == UNREACHABLE, VALUE, beyond)
     return figure
 
 
@@ -183,26 +193,32 @@ def check_table(found: Check) -> bytes:
     grid = found.grid
     poses = grid.grid.requests_at(np.ndindex(grid.grid.shape))
     given = [*poses[0].given]
-    rows: list[list[Any]] = [[*given, "state", *MEASURES]]
-    columns = [grid.values(measure) for measure in MEASURES]
+    columns = {measure: grid.values(measure) for measure in MEASURES}
+    if grid.beyond is not None:
+        columns["beyond_limits"] = tuple(grid.beyond.ravel().tolist())
+    rows: list[list[Any]] = [[*given, "state", *columns]]
     for i, (pose, state) in enumerate(zip(poses, grid.states, strict=True)):
         values = ["/".join(map(repr, pose.given[name])) for name in given]
-        rows.append([*values, state, *("" if column[i] is None else repr(column[i]) for column in columns)])
+        rows.append([*values, state, *("" if column[i] is None else repr(column[i]) for column in columns.values())])
     return encode_csv(rows)
 
 
-def require_plane(setup: ObservedRobot, plane: Pose | str | None = None, **_: Any) -> None:
+def require_plane(
+    setup: ObservedRobot, plane: Pose | str | None = None, grid: Grid | str | None = None, **_: Any
+) -> None:
     """Raise the error of the plane, or the reason why there is no locus."""
     from ..analysis.singularity.locus import require_plane
 
-    require_plane(setup, plane)
+    require_plane(setup, plane, grid)
 
 
-def compute_singular_locus(found: Singularity, plane: Pose | str | None, steps: int, seed: int) -> Locus:
-    """Compute the Type 2 locus over a plane of poses."""
+def compute_singular_locus(
+    found: Singularity, plane: Pose | str | None, grid: Grid | str | None, steps: int, seed: int
+) -> Locus:
+    """Compute the Type 2 locus over a plane of poses, or over a grid."""
     from ..analysis.singularity.locus import compute_locus
 
-    return compute_locus(found.setup, plane=plane, steps=steps, seed=seed)
+    return compute_locus(found.setup, plane=plane, grid=grid, steps=steps, seed=seed)
 
 
 @in_style
@@ -210,7 +226,7 @@ def draw_locus_map(found: Singularity, drawn: Locus, paper: Paper = PNG) -> byte
     """Draw the Type 2 loci of the hidden and the real robot over a plane, the Type 1 boundary and unreached poses."""
     from matplotlib.patches import Patch
 
-    plane = MapPlane.of(drawn.grid.axes, found.setup.motion, 0.4, 1.6)
+    plane = MapPlane.of(label_joints(drawn.grid, found.setup.robot).axes, found.setup.motion, 0.4, 1.6)
     figure, (place,) = make_panels(1, 1, 7.2, 6.0 * plane.tall + 1.6, paper)
     shade = np.log10(np.maximum(drawn.hidden.type2, DARKEST_SINGULAR_VALUE_MAX))
     plane.cells(
@@ -226,7 +242,9 @@ def draw_locus_map(found: Singularity, drawn: Locus, paper: Paper = PNG) -> byte
         if field is not None:
             entries.insert(0, _draw_locus_curve(place, plane, field, name))
     plane.finish(place, plane.x, plane.y)
-    entries += [Patch(facecolor="0.5", label="darker: closer to Type 2"), *borders]
+    entries += [Patch(facecolor="0.5", label="darker: closer to Type 2"), *borders, *list_limit_entries(drawn.beyond)]
+    if drawn.beyond is not None:
+        plane.beyond_limits(place, drawn.beyond)
     if not np.isfinite(drawn.hidden.type2).all():
         entries.append(make_missing_entry())
     entries += plane.robot(figure, found.setup.all_samples.start)
@@ -234,7 +252,7 @@ def draw_locus_map(found: Singularity, drawn: Locus, paper: Paper = PNG) -> byte
     draw_heading(
         figure,
         f"{found.setup.robot.name}: Type 2 singularities, legs {', '.join(found.setup.labels)} observed",
-        drawn.grid.fixed,
+        drawn.grid,
     )
     return print_figure(figure, paper)
 
@@ -255,20 +273,24 @@ def _draw_locus_curve(place: Any, plane: MapPlane, field: SingularityMap, name: 
 
 
 def _draw_boundary(place: Any, plane: MapPlane, drawn: Locus) -> list[Any]:
-    """Draw the boundary of the reached poses, coloured near a Type 1 singularity; return the entries of the legend."""
+    """Draw the boundary of the reached poses, coloured near a Type 1 singularity, of motors and joints near a Type 2
+    singularity of the real robot; return the entries of the legend."""
     reached = np.isfinite(drawn.hidden.type2)
     padded = np.pad(reached, 1, mode="edge")
     inside = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
     border = reached & ~inside
     near = np.zeros_like(reached)
-    for field in (drawn.hidden, drawn.real):
-        if field is not None:
-            padded = np.pad(np.where(reached, field.type1, np.inf), 2, constant_values=np.inf)
-            around = [padded[i : i + reached.shape[0], j : j + reached.shape[1]] for i in range(5) for j in range(5)]
-            near |= np.min(around, axis=0) < TYPE_1_BOUNDARY_FRACTION * np.nanmedian(field.type1)
+    joints, real = bool(drawn.grid.joints), drawn.real
+    kind = "Type 2 boundary of the real robot" if joints else "Type 1 boundary"
+    distances = [] if joints else [drawn.hidden.type1]
+    distances += [] if real is None else [real.type2 if joints else real.type1]
+    for distance in distances:
+        padded = np.pad(np.where(reached, distance, np.inf), 2, constant_values=np.inf)
+        around = [padded[i : i + reached.shape[0], j : j + reached.shape[1]] for i in range(5) for j in range(5)]
+        near |= np.min(around, axis=0) < TYPE_1_BOUNDARY_FRACTION * np.nanmedian(distance)
     entries = []
     for cells, colour, words in (
-        (border & near, palette.SERIES[1], "Type 1 boundary"),
+        (border & near, palette.SERIES[1], kind),
         (border & ~near, "black", "other workspace boundary"),
     ):
         i, j = np.nonzero(cells)
@@ -300,7 +322,7 @@ def draw_error_map(found: Accuracy, paper: Paper = PNG) -> bytes:
     plots.draw_legend(figure, _list_error_entries(field, locus) + _draw_robot(figure, axes, found.setup), paper)
     legs = ", ".join(f"{o.leg} {found.bounds.words(i, o)}" for i, o in enumerate(found.setup.observed))
     what = "observed legs" if all(o.is_segment_direction for o in found.setup.observed) else "observed"
-    draw_heading(figure, f"{found.setup.robot.name}: largest errors\n{what}: {legs}", field.grid.fixed, "; ")
+    draw_heading(figure, f"{found.setup.robot.name}: largest errors\n{what}: {legs}", field.grid, "; ")
     return print_figure(figure, paper)
 
 
@@ -323,6 +345,7 @@ def _draw_error_maps(
             if not flat and field.determinant is not None:
                 locus |= _draw_loss(place, plane, field.determinant[..., k])
         made.scale(norm, ERRORS, label, "max" if np.nanmax(values) > high else "neither", number)
+    made.mark_beyond(field.beyond)
     return made.figure, (flat and _locus(field, [place for (place,) in made.maps], plane)) or locus
 
 
@@ -360,7 +383,8 @@ def _draw_pieces(place: Any, plane: MapPlane, curve: Array, **style: Any) -> Non
     """Draw pieces (k, 2, 2) of a curve."""
     from matplotlib.collections import LineCollection
 
-    place.add_collection(LineCollection(list(np.stack(plane.at(curve[..., 0], curve[..., 1]), axis=-1)), **style))
+    pieces = np.stack(plane.spots(curve.reshape(-1, 2)), axis=-1).reshape(curve.shape)
+    place.add_collection(LineCollection(list(pieces), **style))
 
 
 def _draw_error_curves(field: ErrorField, grid: Grid, shown: list[tuple[Array, str]], paper: Paper) -> tuple[Any, bool]:
@@ -372,7 +396,7 @@ def _draw_error_curves(field: ErrorField, grid: Grid, shown: list[tuple[Array, s
         place.minorticks_off()
         ticks = round_ticks(*_choose_scale_ends(np.where(np.isfinite(errors), errors, np.nan), np.inf))
         place.set_yticks(list(ticks), labels=format_ticks(ticks))
-        label_curve(place, name, x, np.isnan(errors), label)
+        label_curve(place, name, x, np.isnan(errors), label, field.beyond)
     return figure, False
 
 
@@ -380,7 +404,7 @@ def _list_error_entries(field: ErrorField, locus: bool) -> list[Any]:
     """Return the legend entries of white lines or points, black lines and hatching."""
     from matplotlib.patheffects import Normal, Stroke
 
-    entries: list[Any] = []
+    entries = list_limit_entries(field.beyond)
     if locus:
         outlined = [Stroke(linewidth=3.4, foreground="black"), Normal()]
         spots = field.determinant is None and field.curve is None
@@ -408,8 +432,11 @@ def format_error_table(found: Accuracy) -> Iterator[bytes]:
     singularities."""
     field = found.field
     assert field is not None
-    yield ",".join((*field.grid.names, "position_mm", "orientation_deg")).encode() + b"\n"
-    columns = 1e3 * field.position.ravel(), np.degrees(field.orientation.ravel())
+    columns = [1e3 * field.position.ravel(), np.degrees(field.orientation.ravel())]
+    names = [*field.grid.names, "position_mm", "orientation_deg"]
+    if field.beyond is not None:
+        names, columns = [*names, "beyond_limits"], [*columns, field.beyond.ravel()]
+    yield ",".join(names).encode() + b"\n"
     for place, *errors in zip(
         product(*(values.tolist() for _, values in field.grid.axes)),
         *(column.tolist() for column in columns),

@@ -89,8 +89,9 @@ class File:
             if asked.get(name) is not None:
                 load_function("figure_format:choose_paper")(PNG, asked.get("width"), asked.get("font"))
         if path is None:
-            if asked.get("plane") is not None and "plane" in self.takes:
-                raise BadRequest("--plane: no figure is written", asked["plane"], remedy="Add -o FILE.png.")
+            for name in {"plane", "grid"} & {*self.takes}:
+                if asked.get(name) is not None:
+                    raise BadRequest(f"--{name}: no figure is written", asked[name], remedy="Add -o FILE.png.")
             return
         ending = Path(path).suffix.lower()
         if self.needs and all(asked[name] is None for name in self.needs):
@@ -372,6 +373,12 @@ OUTPUTS = {
                 computed="maps:compute_singular_locus",
                 asks=(
                     Option("plane", "Plane of poses to draw, such as z=-0.7.", "PART=VALUE"),
+                    Option(
+                        "grid",
+                        "What to draw instead: two ranges of poses, joints or motors: roll=-1:1:41,pitch=-1:1:41 "
+                        "or motors:NAME=-1:1:41,NAME=-1:1:41.",
+                        "GRID",
+                    ),
                     Option("steps", "Poses along each side of the plane.", None, int, 51, low=5, high=300),
                 ),
                 record="locus",

@@ -10,13 +10,14 @@ from importlib.util import find_spec
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import BadRequest, MissingExtra
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import PlatformMotion
 from ..mechanism import Mechanism
-from ..mechanism.pose import ANGLES, Grid, JointPose, Pose
+from ..mechanism.pose import ANGLES, TURNS, Grid, JointPose, Pose
 from ..results import Result
 from .figure_format import BESIDE, PNG, GivenFigure, Paper, draw_legend_within, print_figure
 from .skeleton import trace_leg_outlines, trace_link_outline
@@ -39,6 +40,8 @@ Given = TypeVar("Given")
 
 MISSING: dict[str, Any] = {"facecolor": "0.85", "edgecolor": "0.6", "hatch": "///"}
 """Style of unreached poses."""
+BEYOND: dict[str, Any] = {"facecolor": "none", "edgecolor": "black", "hatch": r"\\", "linewidth": 0}
+"""Style of poses with joints beyond their limits."""
 ROBOT: dict[str, Any] = {"color": "black", "alpha": 0.3, "linewidth": 1.2}
 """How a robot is drawn in a map of its poses."""
 
@@ -201,6 +204,21 @@ class MapPlane:
         place.fill(u, v, linewidth=0, zorder=0, **MISSING)
         place.pcolormesh(*self.at(*corners), np.ma.masked_invalid(values), **style)
 
+    def beyond_limits(self, place: Any, beyond: NDArray[np.bool_]) -> None:
+        """Hatch the cells at which joints are beyond their limits."""
+        x, y = (
+            np.concatenate([e[:1], values, e[-1:]]) for values in (self.x, self.y) for e in [compute_cell_edges(values)]
+        )
+        if beyond.any():
+            drawn = place.contourf(
+                *self.at(*np.meshgrid(x, y, indexing="ij")),
+                np.pad(beyond.astype(float), 1, mode="edge"),
+                levels=[0.5, 1.5],
+                colors="none",
+                hatches=[BEYOND["hatch"]],
+            )
+            drawn.set(edgecolor=BEYOND["edgecolor"], linewidth=0)
+
     def robot(self, figure: Any, at: ClosedConfiguration) -> list[Any]:
         """Draw the robot to scale, faintly, in all maps of a figure of lengths; its entry in the legend."""
         from matplotlib.collections import LineCollection
@@ -277,18 +295,22 @@ def draw_layer_title(place: Any, name: str, value: float) -> None:
     place.set_title(f"{label_axis(name)}: {value:.4g}", fontsize=10)
 
 
-def label_curve(place: Any, name: str, x: Array, missing: Array, label: str, which: str = "major") -> None:
-    """Finish a curve over one part of a pose: names, grey where nothing is reached."""
+def label_curve(
+    place: Any, name: str, x: Array, missing: Array, label: str, beyond: NDArray[np.bool_] | None = None
+) -> None:
+    """Finish a curve over one part of a pose: names, grey where nothing is reached, hatched beyond joint limits."""
     edges = compute_cell_edges(x)
+    for k in [] if beyond is None else np.flatnonzero(beyond):
+        place.axvspan(edges[k], edges[k + 1], **BEYOND)
     for k in np.flatnonzero(missing):
         place.axvspan(edges[k], edges[k + 1], linewidth=0, **MISSING)
     place.set(xlabel=label_axis(name), ylabel=label, xlim=(edges[0], edges[-1]))
-    place.grid(which=which)
+    place.grid()
 
 
-def draw_heading(figure: Any, text: str, fixed: Pose | JointPose, before: str = "\n") -> None:
-    """Set the title, followed by the fixed coordinates, angles in degrees."""
-    words = describe_pose(fixed)
+def draw_heading(figure: Any, text: str, grid: Grid, before: str = "\n") -> None:
+    """Set the title, followed by the coordinates that a grid keeps, angles in degrees."""
+    words = grid.fixed_text if {*TURNS} & {*grid.names} else describe_pose(grid.fixed)
     figure.suptitle(text + (f"{before}{words}" if words else ""))
 
 
@@ -312,6 +334,13 @@ def make_legend_entry(label: str, **style: Any) -> Any:
     from matplotlib.lines import Line2D
 
     return Line2D([], [], label=label, **style)
+
+
+def list_limit_entries(beyond: NDArray[np.bool_] | None) -> list[Any]:
+    """Return the legend entry of poses with joints beyond their limits, if there are any."""
+    from matplotlib.patches import Patch
+
+    return [] if beyond is None or not beyond.any() else [Patch(label="beyond joint limits", **BEYOND)]
 
 
 def make_missing_entry() -> Any:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..geometry.vectors import Array
 from ..kinematics.platform_motion import PlatformMotion
@@ -72,6 +73,12 @@ class PoseMap:
         """The axes of a quantity, each with its part of ``values`` (over the grid)."""
         parts = np.moveaxis(np.asarray(values).reshape(len(self.plane.x), len(self.plane.y), -1), -1, 0)
         return zip(self.maps[quantity], parts, strict=True)
+
+    def mark_beyond(self, beyond: NDArray[np.bool_] | None) -> None:
+        """Hatch the poses with joints beyond their limits in all maps; nothing without limits."""
+        for quantity in range(len(self.maps)) if beyond is not None else ():
+            for place, layer in self.layers(beyond, quantity):
+                self.plane.beyond_limits(place, layer)
 
     def scale(self, norm: Any, colours: str, label: str, extend: str, quantity: int = 0) -> None:
         """The logarithmic scale of the colours of a quantity."""

@@ -13,6 +13,8 @@ import pytest
 
 from analysis.singularity.found import found
 from analysis.singularity.test_figures import centre
+from hrsynth.analysis.accuracy.accuracy import accuracy
+from hrsynth.analysis.check import check
 from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.singularity.locus import COARSE_GRID_SIDE_COUNT, LOCUS_SIDES, Locus, choose_plane_grid
@@ -24,6 +26,8 @@ from hrsynth.errors import BadRequest, NoReachablePose
 from hrsynth.geometry.vectors import normalise_vector
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.platform_motion import PlatformMotion
+from hrsynth.mechanism import Mechanism
+from hrsynth.mechanism.builder import build
 from hrsynth.mechanism.pose import Pose
 from hrsynth.present import palette
 from hrsynth.present.maps import _draw_boundary, _draw_locus_curve, draw_locus_map
@@ -287,3 +291,76 @@ def test_a_plane_whose_poses_depend_on_each_other_says_so() -> None:
 def test_planes_that_are_none(robot: str, plane: str | None, words: str) -> None:
     with pytest.raises(BadRequest, match=words):
         drawn(load(robot), plane=plane, steps=5)
+
+
+def wrist() -> Mechanism:
+    """Three legs of three R each, all axes through one point, neighbouring ones at right angles."""
+    made, axes = build("wrist"), 0.1 * np.eye(3)
+    made.link("base")
+    made.link("mount")
+    for leg in "123":
+        first, middle, last = np.roll(axes, 1 - int(leg), axis=0)
+        made.link(f"crank_{leg}")
+        made.link(f"arc_{leg}")
+        made.joint(f"motor_{leg}", "R", "base", f"crank_{leg}", at=first, axis=first, motor=True)
+        made.joint(f"elbow_{leg}", "R", f"crank_{leg}", f"arc_{leg}", at=middle, axis=middle)
+        made.joint(f"end_{leg}", "R", f"arc_{leg}", "mount", at=last, axis=last, loop=leg != "1")
+        made.observe(leg, f"arc_{leg}", middle)
+    return made.build(platform="mount")
+
+
+@pytest.mark.parametrize(
+    ("robot", "grid"),
+    [
+        (lambda: load("3rrr_m1"), "motors:shoulder_1=-0.3:0.3:3,shoulder_2=-0.5:0.3:3"),
+        (lambda: load("3rrr_m1"), "joints:elbow_1=-0.2:0.2:3,shoulder_2=-0.2:0.2:3,shoulder_3=0.1"),
+        (wrist, "roll=-0.6:0.6:3,pitch=-0.6:0.6:3"),
+        pytest.param(wrist, "motors:motor_1=-0.5:0.5:4,motor_3=-0.5:0.5:4", marks=pytest.mark.slow),
+    ],
+)
+def test_a_locus_over_motors_joints_and_turns_has_the_values_of_a_check(
+    robot: Callable[[], Mechanism], grid: str
+) -> None:
+    locus, checked = drawn(robot(), grid=grid), check(robot(), grid=grid).grid
+    assert checked is not None
+    expected = np.array([np.nan if each is None else each for each in checked.values("type2")]).reshape(
+        locus.grid.shape
+    )
+    assert np.isfinite(expected).any()
+    np.testing.assert_allclose(locus.hidden.type2, expected, atol=1e-9)
+    record, there = locus.to_dict(), checked.to_dict()
+    kind = grid.partition(":")[0]
+    assert record["axes"] == (
+        {kind: there[kind]} if kind in there else {name: there[name] for name in locus.grid.names}
+    )
+
+
+def test_a_locus_over_motors_is_drawn() -> None:
+    locus = drawn(load("3rrr_m1"), grid="motors:shoulder_1=-0.5:0.1:5,shoulder_2=-0.5:0.2:5")
+    assert np.nanmin(locus.hidden.value) < 0 < np.nanmax(locus.hidden.value)
+    assert draw_locus_map(found("3rrr_m1"), locus) != draw_locus_map(found("3rrr_m1"), planar())
+
+
+@pytest.mark.slow
+def test_the_curve_over_motors_is_singular() -> None:
+    """Points of the curve that is drawn over motors are poses where the rank is lost, by a check of the same motors."""
+    field = accuracy(load("3rrr_m1"), cone="0.1deg", grid="motors:shoulder_1=-0.5:0.1:9,shoulder_2=-0.5:0.2:9").field
+    assert field is not None
+    assert field.curve is not None
+    assert len(field.curve)
+    places = field.curve.reshape(-1, 2)[::5]
+    at = [{"motors": dict(zip(("shoulder_1", "shoulder_2"), place.tolist(), strict=True))} for place in places]
+    values = [each.distances.type2 for each in check(load("3rrr_m1"), at=at).postures]
+    assert max(values) < 0.1 * np.nanmedian(field.smallest)
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        ({"grid": "x=-0.1:0.1:5"}, "number of ranges of a locus"),
+        ({"grid": "x=-0.1:0.1:5,y=0:0.1:5", "plane": "phi=0"}, "--plane and --grid"),
+    ],
+)
+def test_a_grid_of_a_locus_has_two_ranges_and_no_plane(asked: dict[str, str], message: str) -> None:
+    with pytest.raises(BadRequest, match=message):
+        drawn(load("3rrr_m1"), **asked)

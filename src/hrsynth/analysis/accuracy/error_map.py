@@ -16,10 +16,11 @@ from ...batch.pose_continuation import explain_grid_dependence, sweep, track_to_
 from ...errors import BadRequest, Disagreement, HrsynthError, NoReachablePose
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.limits import has_limits, mark_beyond_limits
 from ...kinematics.velocity_relation import ObservationModel
 from ...mechanism.pose import GRID_CELLS_MAX, Grid, JointPose, Pose
 from ...progress import report
-from ...records import DEG, FLAT, MM, As, Recorded, Table
+from ...records import BEYOND_LIMITS, DEG, FLAT, MM, As, Recorded, Table, recorded
 from ...results import Value
 from ...tolerances import RELATION_ANGLE_TOL
 from ..observed import ObservedRobot
@@ -38,8 +39,8 @@ ERROR_MAP_CHUNK_COUNT = 25_000
 """Poses, at least, that are evaluated between two signs of progress."""
 ERROR_MAP_CHECKED_POSES_COUNT = 10
 """Number of poses of a grid at which the batch is compared with Pinocchio."""
-FINE, COARSE = 201, 41
-"""Poses a side of a plane by the batch, and one by one."""
+FINE, LIMITED, COARSE = 201, 101, 41
+"""Poses a side of a plane by the batch, by the batch with joint limits, and one by one."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -56,6 +57,8 @@ class ErrorField(Value):
     smallest: Callable[[], Array]
     gap: float
     curve: Callable[[], Array] | None = None
+    beyond: Flags | None = None
+    """Mask of the poses with joints beyond their limits; None without limits, or where they are not checked."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -83,6 +86,12 @@ class ErrorMap(Value):
     spots: Annotated[SpotChecks | None, As("checked")]
     smallest_at: Callable[[Array], Array] | None
     dependent: str | None = None
+
+    @cached_property
+    @recorded(As("beyond_limits", optional=True), Table | None, BEYOND_LIMITS)
+    def beyond(self) -> Flags | None:
+        """Mask of the poses with joints beyond their limits, in the grid's shape; None where limits are not checked."""
+        return None if self.seen.beyond is None else self.seen.beyond.reshape(self.grid.shape)
 
     @cached_property
     def determinant(self) -> Array | None:
@@ -141,7 +150,7 @@ class Mapper(Value):
                 return possible & self.batch.evaluate(X).reached
             return np.array([at is not None for at in sweep(first, all_samples.observation_model, coarse, motion)])
 
-        count = steps or (FINE if self.batch is not None else COARSE)
+        count = steps or (COARSE if self.batch is None else LIMITED if has_limits(self.setup.mechanism) else FINE)
         return choose_plane_grid(all_samples.start, all_samples.observation_model, motion, plane, count, met)
 
     def over(self, grid: Grid, seed: int, checked: int = ERROR_MAP_CHECKED_POSES_COUNT) -> ErrorMap:
@@ -183,7 +192,21 @@ class Mapper(Value):
             partial(self._determinant, grid),
             partial(self._smallest, grid),
             max(part[3] for part in parts),
+            beyond=self._mark_beyond(grid),
         )
+
+    def _mark_beyond(self, grid: Grid) -> Flags | None:
+        """Mask of the poses of a grid with joints beyond their limits; None without limits, of too many poses, and
+        where the joints of a pose are found one by one."""
+        if self.setup.placer is None or not has_limits(self.setup.mechanism) or grid.size > GRID_CELLS_MAX:
+            return None
+        configurations: list[ClosedConfiguration | None] = []
+        for start in range(0, grid.size, ERROR_MAP_CHUNK_COUNT):
+            report("joint limits")
+            configurations += self._configurations(
+                grid, np.arange(start, min(start + ERROR_MAP_CHUNK_COUNT, grid.size))
+            )
+        return mark_beyond_limits(configurations)
 
     @staticmethod
     def errors(possible: Flags, part: Evaluation) -> tuple[Flags, Array, Array, float]:
@@ -260,7 +283,8 @@ class Mapper(Value):
             lambda: None,
             lambda: table[4],
             _compute_bound_gap(table[:2], table[2:4]),
-            partial(plane.curve, found) if grid.ndim == 2 and not grid.joints else None,
+            partial(plane.curve, found) if grid.ndim == 2 else None,
+            mark_beyond_limits(found),
         )
 
     def spots(

@@ -20,6 +20,7 @@ from ...errors import Disagreement, UndefinedValue
 from ...geometry.ranks import compute_kernel_basis
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.limits import is_within_limits, mark_beyond_limits
 from ...kinematics.velocity_relation import ObservationModel, compute_platform_motions, compute_relation
 from ...kinematics.walking import WALK_SINGULAR_VALUE_MIN_FRACTION, walk_randomly
 from ...mechanism.cameras import CameraObservation
@@ -48,6 +49,8 @@ LOCUS_POSES_COUNT = 10
 LOCUS_SEARCH_STARTS_COUNT = 4
 """Number of poses nearest a singularity from which the locus is searched, if the expression has no sign across it, or
 none was found."""
+WeakPose = tuple[tuple[bool, float], ClosedConfiguration]
+"""A pose, whether joints are beyond their limits there, and its smallest singular value."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -66,6 +69,9 @@ class Agreement(Value):
     on_locus: tuple[ClosedConfiguration, ...]
     searches: Recorded[int]
     """Changes of sign and weak poses from which a pose on the locus was sought."""
+    within: Annotated[
+        int | None, As("within_limits", optional=True), "number of random poses with all joints within their limits"
+    ] = None
 
     positive = Shown(int, lambda self: self.sides[0])
     negative = Shown(int, lambda self: self.sides[1])
@@ -83,6 +89,7 @@ def compare_condition(
     placer: ConfigurationBuilder | None = None,
 ) -> Agreement:
     """Compare at ``count`` random reachable poses, at poses on the locus, and at the ends of descents of the rank.
+    Poses on the locus are sought within joint limits first, and beyond them where none is found.
 
     Raises ``Disagreement`` if the rank, the rows behind the words and the expression do not agree. Poses near
     constraint singularities, where no rank is certain, and those at which a leg blocks a platform dof are left out.
@@ -92,8 +99,9 @@ def compare_condition(
     walk: list[ClosedConfiguration] = []
     signs: list[float] = []
     sizes: list[tuple[float, float]] = []
-    low: list[tuple[float, ClosedConfiguration]] = []
-    parts: list[tuple[float, ClosedConfiguration]] = []
+    low: list[WeakPose] = []
+    parts: list[WeakPose] = []
+    within: int | None = None
     quick = Quick.of(placer, observation_model)
     walks = walk_randomly(start, count, seed) if quick is None else quick.placer.random_walk(count, seed)
     for number, drawn in enumerate(_split_chunks(walks)):
@@ -124,8 +132,13 @@ def compare_condition(
             walk += chunk
             signs += list(np.sign(values))
             sizes += zip(np.abs(values), spectra.prod(axis=1), strict=True)
-        low = sorted([*low, *zip(ranks.tolist(), chunk, strict=True)], key=_measure_pair)[:LOCUS_SEARCH_STARTS_COUNT]
-        parts.append(min(zip(ranks.tolist(), chunk, strict=True), key=_measure_pair))
+        beyond = mark_beyond_limits(chunk)
+        if beyond is not None:
+            within = (within or 0) + int(np.sum(~beyond))
+        outside = [False] * len(chunk) if beyond is None else beyond.tolist()
+        weak = list(zip(zip(outside, ranks.tolist(), strict=True), chunk, strict=True))
+        low = sorted([*low, *weak], key=_measure_pair)[:LOCUS_SEARCH_STARTS_COUNT]
+        parts.append(min(weak, key=_measure_pair))
         report("random poses")
     on_locus: list[ClosedConfiguration] = []
     if all(leg.tip.link == leg.body for leg in pattern.legs):
@@ -145,28 +158,31 @@ def compare_condition(
             _search_zeros(others, observation_model, pattern, condition),
         ]
     ):
+        new: list[ClosedConfiguration] = []
         for at in starts:
             searches += 1
             if (
                 at is None
                 or _is_undecided_place(at, observation_model, loops, freedoms)
-                or _is_known(at, on_locus, observation_model)
+                or _is_known(at, [*on_locus, *new], observation_model)
             ):
                 continue
             sigma = float(_verify_smallest_values(pattern.values_at([at]), observation_model, condition)[0][0])
             if sigma > RANK_CUTOFF_FRACTION:
                 wrong += 1
-            on_locus.append(at)
-            if len(on_locus) == LOCUS_POSES_COUNT:
+            new.append(at)
+            if len(new) == LOCUS_POSES_COUNT:
                 break
-        if on_locus:
+        on_locus += new
+        if any(map(is_within_limits, new)):
             break
+    on_locus.sort(key=is_within_limits, reverse=True)
     report("poses nearest a singularity")
-    for _, weak in [*low, *others][:RANK_DESCENTS]:
-        at = descend_to_rank_loss(weak, observation_model)
+    for _, near in [*low, *others][:RANK_DESCENTS]:
+        at = descend_to_rank_loss(near, observation_model)
         if at is not None and not _is_undecided_place(at, observation_model, loops, freedoms):
             wrong += _is_missed(at, observation_model, pattern, condition)
-    found = Agreement(met, wrong, angle, smallest, (positive, negative), tuple(on_locus), searches)
+    found = Agreement(met, wrong, angle, smallest, (positive, negative), tuple(on_locus), searches, within)
     if wrong or angle > RANK_CUTOFF_FRACTION * RANK_GAP_MIN:
         raise Disagreement(start.model.mechanism.name, wrong, angle)
     return found
@@ -290,13 +306,12 @@ def _verify_smallest_values(
 def _find_crossings(
     walk: Sequence[ClosedConfiguration], signs: Sequence[float], pattern: ConstraintPattern, condition: Condition
 ) -> Iterator[ClosedConfiguration | None]:
-    """Zeros of the expression between neighbours of a walk at which it has different signs, None where one is not
-    found."""
+    """Zeros of the expression between neighbours of a walk at which it has different signs, those between neighbours
+    within joint limits first; None where one is not found."""
     from scipy.optimize import brentq
 
-    for (one, a), (two, b) in pairwise(zip(walk, signs, strict=True)):
-        if a * b >= 0:
-            continue
+    pairs = [(before, after) for (before, a), (after, b) in pairwise(zip(walk, signs, strict=True)) if a * b < 0]
+    for one, two in sorted(pairs, key=lambda pair: not all(map(is_within_limits, pair))):
         model = one.model
         step = model.difference(one.q, two.q)
         if np.linalg.norm(step) > 1.0:
@@ -340,7 +355,7 @@ def _sharpen(
 
 
 def _search_zeros(
-    low: Sequence[tuple[float, ClosedConfiguration]],
+    low: Sequence[WeakPose],
     observation_model: ObservationModel,
     pattern: ConstraintPattern,
     condition: Condition,
@@ -351,7 +366,7 @@ def _search_zeros(
         yield descend(start, observation_model, pattern, condition)
 
 
-def _measure_pair(pair: tuple[float, ClosedConfiguration]) -> float:
+def _measure_pair(pair: WeakPose) -> tuple[bool, float]:
     return pair[0]
 
 

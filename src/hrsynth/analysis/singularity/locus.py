@@ -6,22 +6,24 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations, product
-from typing import Annotated, cast
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...batch.pose_continuation import explain_grid_dependence, sweep, track_to_pose
+from ...batch.pose_continuation import explain_grid_dependence, sweep, track_to_pose, track_to_request
 from ...errors import BadRequest, NoReachablePose, PoseReachFailure
 from ...geometry.so3 import turn_about
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.joint_coordinates import FileCoordinates, list_coordinate_joints, read_joints
+from ...kinematics.limits import mark_beyond_limits
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.velocity_relation import ObservationModel
 from ...mechanism import Mechanism
-from ...mechanism.pose import Grid, Pose, convert_to_pose
+from ...mechanism.pose import TURNS, FixedParts, Grid, GridValues, JointPose, Pose, compute_rpy, convert_to_pose
 from ...progress import report
-from ...records import As, Number, Recorded, Shown, recorded
+from ...records import BEYOND_LIMITS, As, Number, Recorded, Shown, Table, recorded
 from ...results import Value
 from ...tolerances import RELATION_ANGLE_TOL, SINGULAR_POSE_DISTANCE_TOL
 from ..measured import MeasuredRobot
@@ -71,6 +73,7 @@ class Locus(Value):
     grid: Grid
     hidden: Recorded[SingularityMap]
     real: Recorded[SingularityMap | None]
+    beyond: Annotated[NDArray[np.bool_] | None, Table | None, As("beyond_limits", optional=True), BEYOND_LIMITS] = None
 
     @property
     @recorded()
@@ -78,8 +81,8 @@ class Locus(Value):
         """Number of its poses that the robot reaches."""
         return int(np.sum(np.isfinite(self.hidden.type2)))
 
-    axes = Shown(dict[str, list[float]], lambda self: dict(self.grid.axes))
-    fixed = Shown(Pose, lambda self: self.grid.fixed)
+    axes = Shown(GridValues, lambda self: self.grid.values_record)
+    fixed = Shown(Pose | FixedParts, lambda self: self.grid.fixed_record if self.grid.joints else self.grid.fixed)
 
 
 def compute_locus(
@@ -89,10 +92,12 @@ def compute_locus(
     *,
     sensor: SensorLike = None,
     plane: Pose | str | None = None,
+    grid: Grid | str | None = None,
     steps: int = PLANE_SIDE_POSES_COUNT,
     seed: int = 0,
 ) -> Locus:
-    """Singularity loci of the hidden and the real robot (with its motors) over a plane of poses.
+    """Singularity loci of the hidden and the real robot (with its motors) over a plane of poses, or over a ``grid`` of
+    two parts of the pose, joints or motors.
 
     ``plane`` fixes parts of the pose so that two are free; a robot that is only partially controllable has no locus
     (``BadRequest``). Raises ``NoReachablePose`` if no pose of the plane is reached.
@@ -103,12 +108,26 @@ def compute_locus(
     if any(joint.is_actuated for joint in setup.mechanism.joints.values()):
         driven = MeasuredRobot.of(setup, real=True)
         real = driven if driven.rank == setup.dof else None
-    return _compute_both_loci(hidden, real, None if plane is None else convert_to_pose(plane), steps)
+    return _compute_both_loci(
+        hidden, real, None if plane is None else convert_to_pose(plane), _parse_locus_grid(grid, plane), steps
+    )
 
 
-def require_plane(setup: ObservedRobot, plane: Pose | str | None) -> None:
+def _parse_locus_grid(grid: Grid | str | None, plane: Pose | str | None) -> Grid | None:
+    """Return the grid of a locus; raises ``BadRequest`` unless it has two ranges and no plane is given."""
+    cells = None if grid is None else Grid.parse(grid)
+    if cells is not None and plane is not None:
+        raise BadRequest("--plane and --grid", f"{plane} and {cells}", "one of them")
+    if cells is not None and cells.ndim != 2:
+        raise BadRequest(f"--grid {cells}: number of ranges of a locus", cells.ndim, "two")
+    return cells
+
+
+def require_plane(setup: ObservedRobot, plane: Pose | str | None, grid: Grid | str | None = None) -> None:
     """Raise what ``locus`` would raise of the robot or of the plane: before long work, not after it."""
     hidden = _require_controllable(setup)
+    if _parse_locus_grid(grid, plane) is not None:
+        return
     _start_plane(
         setup.all_samples.start,
         hidden.observation_model,
@@ -128,8 +147,11 @@ def _require_controllable(setup: ObservedRobot) -> MeasuredRobot:
     return hidden
 
 
-def _compute_both_loci(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None, steps: int) -> Locus:
-    """Both robots over the plane that ``plane`` fixes (default: of three parts the third as at the zero configuration).
+def _compute_both_loci(
+    hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None, grid: Grid | None, steps: int
+) -> Locus:
+    """Both robots over the grid, or the plane that ``plane`` fixes (default: of three parts the third as at the zero
+    configuration).
 
     Raises ``NoReachablePose`` where no pose of it is reached, ``BadRequest`` where it does not leave two parts free.
     """
@@ -139,7 +161,7 @@ def _compute_both_loci(hidden: MeasuredRobot, real: MeasuredRobot | None, plane:
     def met(first: ClosedConfiguration, coarse: Grid) -> NDArray[np.bool_]:
         return np.array([at is not None for at in sweep(first, observation_model, coarse, motion, placer)])
 
-    grid = choose_plane_grid(start, observation_model, motion, plane, steps, met)
+    grid = grid or choose_plane_grid(start, observation_model, motion, plane, steps, met)
     configurations = sweep(start, observation_model, grid, motion, placer)
     if not any(configurations):
         raise NoReachablePose(
@@ -175,7 +197,13 @@ def _compute_both_loci(hidden: MeasuredRobot, real: MeasuredRobot | None, plane:
             tables[0], condition.signed, tables[1], tables[2], spots, curve, condition.never, not measured.unexamined
         )
 
-    return Locus(grid, field(hidden), None if real is None else field(real))
+    beyond = mark_beyond_limits(configurations)
+    return Locus(
+        grid,
+        field(hidden),
+        None if real is None else field(real),
+        None if beyond is None else beyond.reshape(grid.shape),
+    )
 
 
 def choose_plane_grid(
@@ -285,6 +313,8 @@ def _choose_axes(
     told = " and ".join(left) + (", which depend on each other" if len(left) > 1 else "")
     allowed = ["fewer fixed parts"] if fixed else []
     allowed += [f"--grid {left[0]}=-0.1:0.1:9 of check, accuracy or basins for a line of poses"] if left else []
+    motors = [joint.name for joint in list_coordinate_joints(start.model.mechanism, motors=True)]
+    allowed += [f"--grid motors:{motors[0]}=-0.5:0.5:41,{motors[1]}=-0.5:0.5:41"] if len(motors) > 1 else []
     raise BadRequest(
         f"{f'--plane {plane}'.strip()}: two parts of the pose of {name} must be free, here {told or 'none'}",
         remedy=f"Use {', or '.join(allowed) or 'single poses'}.",
@@ -305,6 +335,31 @@ def _read_coordinates(motion: PlatformMotion, at: ClosedConfiguration, names: Se
     ]
 
 
+def _read_place(grid: Grid, motion: PlatformMotion, at: ClosedConfiguration) -> list[float]:
+    """The values of what varies in a grid at a configuration."""
+    if grid.joints:
+        joints = read_joints(at)
+        return [joints[name][0] for name in grid.names]
+    if {*TURNS} & {*grid.names}:
+        X = at.pose(motion.link)
+        values = dict(zip(TURNS, compute_rpy(X[:3, :3] @ motion.home[:3, :3].T), strict=True))
+        values |= dict(zip("xyz", motion.position(X).tolist(), strict=True))
+        return [values[name] for name in grid.names]
+    return _read_coordinates(motion, at, grid.names)
+
+
+def _measure_deviation(
+    start: ClosedConfiguration, at: ClosedConfiguration, asked: Pose | JointPose, motion: PlatformMotion
+) -> float:
+    """Deviation of a configuration from a requested pose (characteristic lengths, radians; of joints metres)."""
+    if not isinstance(asked, JointPose):
+        return float(np.linalg.norm(motion.goal(asked).error_and_jacobian(at.model, at.q)[0]))
+    joints, at_zero = read_joints(at), read_joints(start)
+    stay = FileCoordinates.of(start).motors if asked.motors else ()
+    wanted = {**{name: at_zero[name] for name in stay}, **dict(asked.values)}
+    return max(float(np.max(np.abs(np.subtract(joints[name], values)))) for name, values in wanted.items())
+
+
 def _find_valleys(table: Array) -> list[int]:
     """The deepest cells that are lower than all their neighbours, by their flat index."""
     filled = np.where(np.isfinite(table), table, np.inf)
@@ -316,11 +371,11 @@ def _find_valleys(table: Array) -> list[int]:
 
 
 def _is_singular_in_same_mode(
-    start: ClosedConfiguration, at: ClosedConfiguration, observation_model: ObservationModel, motion: PlatformMotion
+    start: ClosedConfiguration, asked: Pose | JointPose, observation_model: ObservationModel, motion: PlatformMotion
 ) -> bool:
-    """Return True if the pose of ``at`` is singular in the working mode of ``start``, too."""
+    """Return True if a requested pose is singular in the working mode of ``start``, too."""
     try:
-        there = track_to_pose(start, observation_model, motion.pose(at.pose(motion.link)), motion)
+        there = track_to_request(start, observation_model, asked, motion)
     except PoseReachFailure:
         return False
     return compute_smallest_value(there, observation_model) < RELATION_ANGLE_TOL
@@ -343,9 +398,11 @@ def _find_isolated_poses(grid: Grid, starts: Sequence[ClosedConfiguration], meas
         at = descend(start, observation_model, measured.pattern, measured.condition)
         if at is None:
             continue
-        error, _ = motion.goal(cast(Pose, grid.fixed)).error_and_jacobian(at.model, at.q)
-        place = _read_coordinates(motion, at, grid.names)
+        place = _read_place(grid, motion, at)
+        asked = grid.request(place)
         new = all(np.linalg.norm(np.subtract(place, other)) > SINGULAR_POSE_DISTANCE_TOL for other in found)
-        if new and np.linalg.norm(error) < ON_PLANE and _is_singular_in_same_mode(start, at, observation_model, motion):
-            found.append(place)
+        if new and _measure_deviation(start, at, asked, motion) < ON_PLANE:
+            pose = asked if isinstance(asked, JointPose) else motion.pose(at.pose(motion.link))
+            if _is_singular_in_same_mode(start, pose, observation_model, motion):
+                found.append(place)
     return np.array(found).reshape(-1, 2)

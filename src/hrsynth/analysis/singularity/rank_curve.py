@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ...batch.pose_continuation import track_to_pose
+from ...batch.pose_continuation import track_to_request
 from ...errors import PoseReachFailure, UndefinedValue
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
@@ -97,7 +97,7 @@ class PlaneOfPoses:
     def _between(self, one: _Weakest, other: _Weakest) -> _Weakest | None:
         place = (one.place + other.place) / 2
         try:
-            at = track_to_pose(one.at, self.observation_model, self.grid.pose(place.tolist()), self.motion)
+            at = track_to_request(one.at, self.observation_model, self.grid.request(place.tolist()), self.motion)
         except PoseReachFailure:
             return None
         return self._weakest(at, place)

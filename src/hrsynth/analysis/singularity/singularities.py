@@ -12,6 +12,7 @@ from ...constraints.pattern import ConstraintPattern
 from ...errors import BadRequest
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.joint_coordinates import OfConfiguration
+from ...kinematics.limits import list_joints_beyond
 from ...kinematics.tasks import solve
 from ...kinematics.velocity_relation import ObservationModel, compute_platform_motions, compute_relation
 from ...mechanism.pose import Pose
@@ -25,6 +26,7 @@ from ..freedoms import Freedom, name_freedoms
 from ..measured import MeasuredRobot
 from ..observation_inputs import POINTS, CameraLike, LegsLike, Seed, SensorLike
 from ..observed import ObservedRobot, RobotLike
+from ..setup_records import LIMITS_IGNORED
 from ..verdict import Verdict
 from .condition_check import Agreement, compare_condition, compute_smallest_value
 
@@ -39,13 +41,14 @@ SINGULARITY_EXAMPLES_COUNT = 3
 @dataclass(frozen=True, eq=False, repr=False)
 class Example(OfConfiguration, Value):
     """Singular pose constructed from the condition: unobserved dof, Pinocchio's smallest singular value there, and the
-    largest at 1 cm distance."""
+    largest at 1 cm distance; joints beyond their limits."""
 
     configuration: ClosedConfiguration
     pose: Recorded[Pose]
     unobserved: Recorded[tuple[Freedom, ...]]
     sigma: Annotated[float, As("singular_value")]
     nearby: Annotated[float, As("singular_value_nearby"), "at 1 cm distance"]
+    beyond_limits: Recorded[tuple[str, ...]]
 
 
 class MeasuredValues(NamedTuple):
@@ -92,7 +95,7 @@ class Singularity(Result, shown_as="singularities"):
     checked
         Comparison of words, expression and rank, None if a dof is unobserved everywhere.
     examples
-        Singular poses constructed from the condition.
+        Singular poses constructed from the condition, those within joint limits first.
     """
 
     setup: ObservedRobot
@@ -153,6 +156,7 @@ class Singularity(Result, shown_as="singularities"):
         lambda self: UncheckedCondition(0, 0) if self.checked is None else self.checked,
         As("checked"),
     )
+    limits_ignored = LIMITS_IGNORED
 
 
 @analysis(
@@ -246,7 +250,8 @@ def _build_example(setup: ObservedRobot, observation_model: ObservationModel, at
         ),
         default=0.0,
     )
-    return Example(at, setup.motion.pose(X), lost, compute_smallest_value(at, observation_model), nearby)
+    beyond = tuple(list_joints_beyond(at.model, at.q))
+    return Example(at, setup.motion.pose(X), lost, compute_smallest_value(at, observation_model), nearby, beyond)
 
 
 def find_neighbours(

@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from ...analysis.modes.modes import AssemblyModes
     from ...analysis.modes.near import NearMode
     from ...analysis.observed import ObservedRobot
+    from ...analysis.singularity.condition_check import Agreement
     from ...analysis.singularity.singularities import Singularity
 
 STATES = {
@@ -83,7 +84,7 @@ def check(found: Check) -> str:
         axes = zip(found.grid.grid.shape, found.grid.grid.names, strict=True)
         size = " × ".join(f"{count} {name}" for count, name in axes)
         fixed = found.grid.grid.fixed_text
-        beyond = sum(bool(each.beyond_limits) for each in found.grid.postures if each is not None)
+        beyond = 0 if found.grid.beyond is None else found.grid.beyond.sum()
         rows.append(
             (
                 "grid",
@@ -265,7 +266,8 @@ def format_singularity(found: Singularity) -> str:
             (
                 "checked",
                 [
-                    f"{checked.points} random poses and {len(checked.on_locus)} on the locus, {checked.disagreements} "
+                    f"{checked.points} random poses{_describe_within(checked)} and {len(checked.on_locus)} on the "
+                    f"locus, {checked.disagreements} "
                     "disagreements of condition, expression and rank",
                     *(
                         []
@@ -282,9 +284,11 @@ def format_singularity(found: Singularity) -> str:
             rows.append(
                 ("", f"expression positive at {checked.sides[0]}, negative at {checked.sides[1]} of the random poses")
             )
-    if condition is not None and not condition.never and not found.examples:
+    rows += format_dropped_limits(found.setup)
+    if condition is not None and not condition.never and all(each.beyond_limits for each in found.examples):
         searches = 0 if checked is None else checked.searches
-        rows.append(("singular at", f"none found by {searches} searches, which does not exclude any"))
+        where = " within joint limits" if found.examples else ""
+        rows.append(("singular at", f"none found{where} by {searches} searches, which does not exclude any"))
     rows.append(
         (
             "singular at",
@@ -295,11 +299,17 @@ def format_singularity(found: Singularity) -> str:
                     str(each.pose),
                     f"  singular value {each.sigma:.1e}, 1 cm away up to {each.nearby:.1e}; unobserved: "
                     + "; ".join(freedom.name for freedom in each.unobserved),
+                    *[f"  beyond joint limits: {', '.join(each.beyond_limits)}"] * bool(each.beyond_limits),
                 )
             ],
         )
     )
     return format_listing(rows)
+
+
+def _describe_within(checked: Agreement) -> str:
+    """Return how many of the random poses are within joint limits; nothing without limits."""
+    return "" if checked.within is None else f" ({checked.within} within joint limits)"
 
 
 def format_modes(found: AssemblyModes) -> str:

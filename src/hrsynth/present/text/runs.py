@@ -203,9 +203,9 @@ def format_accuracy(found: Accuracy) -> str:
     ]
     length = found.setup.all_samples.model.length
     if found.field is not None:
-        rows += [*GAP, *format_field_rows(found), *_format_ignored_limits(found)]
+        rows += [*GAP, *format_field_rows(found), *_format_grid_limits(found)]
     if found.swept is not None:
-        rows += [*GAP, *_format_swept_rows(found, found.swept), *_format_ignored_limits(found)]
+        rows += [*GAP, *_format_swept_rows(found, found.swept), *_format_grid_limits(found)]
     for errors, true in zip(found.poses, found.sampled, strict=True):
         rows += [
             *GAP,
@@ -218,8 +218,10 @@ def format_accuracy(found: Accuracy) -> str:
     return format_listing(rows)
 
 
-def _format_ignored_limits(found: Accuracy) -> Rows:
-    """Return the row of joint limits that a grid does not check."""
+def _format_grid_limits(found: Accuracy) -> Rows:
+    """Return the row of joint limits: how many poses of a grid are beyond them, or those that it does not check."""
+    if found.field is not None and found.field.beyond is not None:
+        return [("limits", f"{found.field.beyond.sum()} poses beyond joint limits")]
     limited = ", ".join(found.setup.mechanism.stops)
     return [("limits", f"those of {limited} are not checked")] if limited else []
 
