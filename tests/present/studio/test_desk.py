@@ -219,6 +219,29 @@ def test_a_plane_has_the_errors_that_moving_there_shows(robot: str, of: str):
     assert np.shape(found["corners"]) == (4, 3)
 
 
+@pytest.mark.some(1, 3)
+@pytest.mark.parametrize("robot", ["delta", "quattro", "orthoglide", "3rrr_m1", "gough_stewart"])
+def test_a_plane_of_a_moved_pose_is_as_fine_as_that_of_the_zero_configuration(robot: str):
+    """And has the errors that moving there shows."""
+    scene = ask("open", robot)
+    sliders, away = scene["sliders"], [each["home"] + 0.2 * (each["max"] - each["home"]) for each in scene["sliders"]]
+    moved = ask("move", robot, values=away)
+    assert not moved["stopped"]
+    plane = ask("plane", robot, here=moved["here"], size=24)
+    assert plane["n"] == ask("plane", robot, size=24)["n"] == 24
+    assert "one by one" not in plane["words"]
+    first, second = (next(each for each in sliders if each["name"] == name) for name in plane["of"])
+    near = [
+        round(23 * (value - each["min"]) / (each["max"] - each["min"]))
+        for value, each in zip(away, sliders, strict=True)
+    ]
+    column, row = near[sliders.index(first)], near[sliders.index(second)]
+    for each, cell in ((first, column), (second, row)):
+        away[sliders.index(each)] = each["min"] + cell / 23 * (each["max"] - each["min"])
+    there = ask("move", robot, here=moved["here"], values=away)["state"]["error"]
+    assert plane["values"][row][column] == pytest.approx(there[there["unit"]], rel=2e-2)
+
+
 def test_in_another_mode_no_command_is_told_that_gives_something_else():
     other = ask("modes", "rrrrr_m1")["modes"][1]["here"]
     found = ask("modes", "rrrrr_m1", here=other)
