@@ -489,6 +489,81 @@ def test_a_slow_ask_says_so_and_is_cancelled_and_a_newer_one_replaces_it(tab: Ta
     assert page.locator("#panel-legs .verdict").inner_text()
 
 
+def hold(page: Any, kind: str) -> list[Any]:
+    """Hold the requests of a kind; calling what is listed sends them."""
+    held: list[Any] = []
+
+    def between(route: Any) -> None:
+        server = route.connect_to_server()
+        route.on_message(
+            lambda message: (
+                held.append(lambda: server.send(message)) if f'"{kind}"' in message else server.send(message)
+            )
+        )
+        server.on_message(route.send)
+
+    page.route_web_socket(re.compile("/live$"), between)
+    return held
+
+
+def release(page: Any, held: list[Any]) -> None:
+    """Send the one request that is held, once it is there."""
+    until(page, "() => studio.link.lanes.desk.sent?.kind === 'open'")
+    page.wait_for_timeout(100)
+    (send,) = held
+    send()
+
+
+@pytest.fixture(scope="module")
+def quattro() -> Iterator[str]:
+    """The page of a server that was opened with a robot."""
+    from hrsynth.present.studio.server import studio
+
+    server = studio("quattro", open_=False)
+    yield server.address
+    server.stop()
+
+
+def test_a_plane_requested_before_the_robot_is_read_is_drawn(tab: Tab, quattro: str):
+    held = hold(tab.page, "open")
+    tab.open(quattro)
+    panel = show(tab.page, "plane")
+    panel.get_by_role("button", name="Draw the plane").dblclick()
+    assert "once the robot is read" in panel.locator("[role=status]").first.inner_text()
+    release(tab.page, held)
+    until(tab.page, "() => studio.panels.plane.record")
+    answered(tab.page)
+    assert said(panel) == ""
+
+
+def test_every_button_clicked_before_the_robot_is_read_acts_once(tab: Tab, quattro: str):
+    held = hold(tab.page, "open")
+    tab.open(quattro)
+    tab.page.locator("#tab-move").wait_for(timeout=SLOW)
+    tab.page.evaluate("""() => { window.acted = [];
+      for (const each of document.querySelectorAll("#tools button, .panel:not(.panel-robot) .body button"))
+        each.onclick = () => acted.push(each.textContent); }""")
+    clicked = []
+    for key in PANELS[1:]:
+        for each in show(tab.page, key).locator(".body button:enabled").all():
+            if each.is_visible():
+                clicked.append(each.inner_text())
+                each.click()
+    tab.page.get_by_role("button", name="Fit").click()
+    assert {"Draw the plane", "Zero configuration", "Find modes of this pose", "Report"} <= {*clicked}
+    assert tab.page.evaluate("acted") == []
+    release(tab.page, held)
+    answered(tab.page)
+    assert tab.page.evaluate("acted") == [*clicked, "Fit"]
+
+
+def test_without_a_robot_a_click_is_answered_in_one_line(tab: Tab, address: str):
+    page = enter(tab, address)
+    panel = show(page, "plane")
+    panel.get_by_role("button", name="Draw the plane").click()
+    assert said(panel) == "No robot is open. Choose one in the panel Robot."
+
+
 def test_a_lost_connection_is_told_and_mended(tab: Tab, address: str):
     open_: list[Any] = []
 

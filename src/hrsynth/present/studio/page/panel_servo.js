@@ -6,7 +6,7 @@ class ServoPanel extends Panel {
     super(studio, "servo", "Servo");
     this.ends = { start: null, goal: null };
     this.places = element("div", { className: "ends" });
-    this.run = button("Run", () => this.go(), { className: "main" });
+    this.run = button("Run", () => this.go(), { className: "main", disabled: true });
     this.player = new Player((frame, index) => this.frame(frame, index), { reduced: studio.reduced });
     this.picture = new CameraPicture();
     this.words = element("p", { "aria-live": "polite" });

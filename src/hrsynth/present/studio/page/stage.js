@@ -164,7 +164,7 @@ return class Stage {
   /* Other assembly modes as outlines, without the one where the robot is; a click on one is told as its label. */
   ghosts(modes) {
     clear(this.parts.ghosts);
-    const { real } = this.machines, size = 0.17 * this.record.length;
+    const { real } = this.machines, size = 0.17 * this.record?.length;
     for (const { label: name, places, reachable } of modes) {
       const group = outline(real.record, places, Colours.of("mode"),
         { name, size, opacity: reachable === false ? 0.16 : 0.3, pick: { kind: "mode", name } });

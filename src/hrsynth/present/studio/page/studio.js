@@ -11,6 +11,9 @@ class Studio {
     const kept = $("kept"), to = { onstart: (said) => this.begin(said), onback: () => this.back(), onlost: (refused) => this.lost(refused) };
     this.link = kept ? new Kept(JSON.parse(kept.textContent), to) : new Link(to);
     this.pending = 0;
+    this.opening = 1;  /* robots that are being read, and the connection */
+    this.early = new Set();
+    document.addEventListener("click", (event) => this.defer(event), true);
     this.tools();
     $("legend").open = !matchMedia("(max-width: 760px)").matches;
     document.addEventListener("keydown", (event) => { if (event.key === "Escape") this.stop(); });
@@ -27,6 +30,29 @@ class Studio {
     this.panels.robot?.fill();
     if (start) this.open(start, { watch, camera, hidden });
     else { this.kept(); this.ready(); }
+    this.act();
+  }
+
+  /* A click on what needs a robot waits while one is being read. */
+  defer(event) {
+    const what = event.target.closest(":is(#tools, .panel:not(.panel-robot) .body) :is(button, [type=checkbox], [type=radio])");
+    const panel = Object.values(this.panels ?? {}).find(({ root }) => root.contains(what));
+    if (!what || (!this.opening && (this.scene || !panel))) return;
+    event.preventDefault();
+    event.stopPropagation();
+    if (!this.opening) return void panel.status.fail("No robot is open. Choose one in the panel Robot.");
+    this.early.add(what);
+    panel?.status.say("This starts once the robot is read.");
+  }
+
+  /* One robot less is being read: after the last one, what was clicked before acts. */
+  act() {
+    this.opening -= 1;
+    if (this.opening) return;
+    const clicked = [...this.early];
+    this.early.clear();
+    for (const panel of Object.values(this.panels)) if (clicked.some((what) => panel.root.contains(what))) panel.status.clear();
+    for (const what of clicked) if (what.isConnected && !what.closest("[hidden]:not(.panel)")) what.click();
   }
 
   ready() { requestAnimationFrame(() => { document.body.dataset.ready = "yes"; }); }
@@ -62,7 +88,13 @@ class Studio {
   }
 
   /* Another robot; the one that is shown stays until the new one is read. */
-  async open(robot, { watch = null, camera = null, hidden = false } = {}) {
+  async open(robot, wanted = {}) {
+    this.opening += 1;
+    await this.read(robot, wanted);
+    this.act();
+  }
+
+  async read(robot, { watch = null, camera = null, hidden = false }) {
     const given = { source: robot.source, options: robot.options || {} };
     const { status } = this.panels.robot || this.panels.move;
     const scene = await status.during(this.link.ask("open", { robot: given, watch, camera, here: null }), "Reading the robot", () => this.link.cancel("open"));
