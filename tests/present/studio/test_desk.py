@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shlex
 from base64 import b64decode
 from pathlib import Path
@@ -74,6 +75,39 @@ def test_a_platform_is_drawn_to_the_nearest_pose_that_it_can_have():
     assert again["residual"] < CLOSED
 
 
+@pytest.mark.some(2)
+@pytest.mark.parametrize("robot", ["delta", "3ppr_m2", "quattro", "gough_stewart"])
+def test_motors_move_the_robot_as_a_pose_by_motors_does(robot: str, capsys: pytest.CaptureFixture[str]):
+    sliders = ask("open", robot)["motor_sliders"]
+    wanted = [each["home"] + 0.02 * (i + 1) for i, each in enumerate(sliders)]
+    far = ask("move", robot, motors=[each["home"] - 0.01 for each in sliders])
+    moved = ask("move", robot, motors=wanted, here=far["here"], hidden=True)
+    ran = run(moved["command"], capsys)["configurations"][0]
+    assert moved["motors"] == pytest.approx(wanted, abs=1e-9)
+    assert moved["values"][:2] == pytest.approx([ran["pose"]["x"], ran["pose"]["y"]], abs=1e-8)
+    assert [*ran["coordinates"]["motors"].values()] == pytest.approx(wanted)
+    assert moved["residual"] < CLOSED
+    assert (moved["here"]["hidden"] is None) == (ask("move", robot, hidden=True)["here"]["hidden"] is None)
+
+
+def test_a_motor_slider_has_the_limits_of_the_file(tmp_path: Path):
+    sliders = ask("open", "3prr_m1")["motor_sliders"]
+    assert [each["name"] for each in sliders] == ["guide_1", "guide_2", "guide_3"]
+    file = tmp_path / "limited.urdf"
+    save(load("3prr_m1"), file)
+    limit = '<limit lower="-0.01" upper="0.02" effort="1" velocity="1"/>'
+    text = re.sub('(name="guide_2".*?)<limit.*?/>', rf"\1{limit}", file.read_text(), count=1, flags=re.DOTALL)
+    file.write_text(text)
+    limited = AnalysisService(folder=tmp_path).answer({"ask": "open", "robot": {"source": "folder:limited.urdf"}})
+    assert [(each["min"], each["max"]) for each in limited["motor_sliders"]] == [
+        pytest.approx((each["min"], each["max"]) if each["name"] != "guide_2" else (-0.01, 0.02)) for each in sliders
+    ]
+    with pytest.raises(HrsynthError, match="limit"):
+        AnalysisService(folder=tmp_path).answer(
+            {"ask": "move", "robot": {"source": "folder:limited.urdf"}, "motors": [0.0, 0.03, 0.0]}
+        )
+
+
 def test_what_no_leg_stands_for_is_asked_for_by_its_link():
     """A link named when the robot was opened stays the one that is watched, whatever legs are ticked."""
     legs = {leg["name"]: leg for leg in ask("open", "quattro", watch=["rod_1b", "2"])["legs"]}
@@ -128,6 +162,9 @@ def test_what_is_no_question_is_refused_in_a_line(asked: Any):
         {"values": [1e400, 0.0]},
         {"values": ["0", 0.0]},
         {"values": [0.0, 0.0], "platform": [0.0] * 7},
+        {"values": [0.0, 0.0], "motors": [0.0, 0.0]},
+        {"motors": [0.0]},
+        {"motors": [1e8, 0.0]},
         {"platform": [0.0] * 7},
         {"watch": "1"},
         {"watch": ["9"]},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -266,6 +267,66 @@ def test_a_slider_moves_its_own_freedom_alone(tab: Tab, address: str):
     assert values[2] > home[2]
 
 
+def test_numbers_are_typed_beside_the_sliders(tab: Tab, address: str):
+    page = opened(tab, address, "3rrr_m1")
+    panel = show(page, "move")
+    x, _, phi = panel.locator(".typed:visible").all()
+    first = panel.locator(".slider").first
+    home = page.evaluate("() => studio.values")
+    x.fill("0.0123")
+    x.press("Enter")
+    answered(page)
+    phi.fill("-5 deg")
+    phi.blur()
+    answered(page)
+    assert page.evaluate("() => studio.values") == pytest.approx([0.0123, home[1], -math.radians(5)], abs=1e-6)
+    assert (x.input_value(), phi.input_value()) == ("0.0123 m", "-5.0°")
+    for text, got in (("9", "x: got 9, expected a number from -"), ("far", "got far"), ("", "got nothing")):
+        x.fill(text)
+        x.press("Enter")
+        line = first.locator("[role=alert]")
+        assert got in line.inner_text()
+        assert "\n" not in line.inner_text()
+        assert line.bounding_box()["y"] - x.bounding_box()["y"] < 80
+        assert x.get_attribute("aria-invalid") == "true"
+    assert page.evaluate("() => studio.values")[0] == pytest.approx(0.0123, abs=1e-6)
+    panel.get_by_role("button", name="Zero configuration").click()
+    answered(page)
+    assert said(first) == ""
+
+
+def test_a_motor_moves_the_robot_until_its_line_stops(tab: Tab, address: str):
+    from hrsynth import check
+    from hrsynth.errors import PoseReachFailure
+
+    page = opened(tab, address, "quattro")
+    panel = show(page, "move")
+    panel.get_by_role("radio", name="Motors").check()
+    sliders = panel.locator(".slider:visible")
+    assert sliders.locator("label").all_inner_texts() == [f"shoulder_{i}" for i in (1, 2, 3, 4)]
+    second = sliders.nth(1)
+    second.locator(".typed").fill("10")
+    second.locator(".typed").press("Enter")
+    answered(page)
+    reached = check("quattro", at={"motors": {"shoulder_2": math.radians(10)}}).to_dict()["configurations"][0]["pose"]
+    there = page.evaluate("() => studio.values")
+    assert there[:3] == pytest.approx([reached[name] for name in "xyz"], abs=1e-6)
+    first = sliders.first
+    first.locator(".typed").fill("170")
+    first.locator(".typed").press("Enter")
+    answered(page)
+    with pytest.raises(PoseReachFailure) as stopped:
+        check("quattro", at={"motors": [math.radians(170), math.radians(10), 0, 0]})
+    assert said(first) == str(stopped.value)
+    assert first.locator(".typed").input_value() == "0.0°"
+    assert page.evaluate("() => studio.values") == there
+    first.get_by_role("slider").focus()
+    page.keyboard.press("ArrowRight")
+    answered(page)
+    assert said(first) == ""
+    assert page.evaluate("() => studio.motors[0]") > 0
+
+
 def test_a_mode_is_flown_to_and_back(tab: Tab, address: str):
     page = opened(tab, address, "rrrrr_m1")
     before = page.evaluate("() => studio.values")
@@ -328,12 +389,14 @@ def test_keys_are_enough(tab: Tab, address: str):
         assert page.locator(f"#panel-{key}").is_visible()
     page.keyboard.press("ArrowRight")
     answered(page)
-    page.keyboard.press("Tab")
+    for _ in range(3):  # the coordinates, the number, the slider
+        page.keyboard.press("Tab")
     before = here(page)
     page.keyboard.press("ArrowRight")
     answered(page)
     assert here(page) != before
-    page.keyboard.press("Shift+Tab")
+    for _ in range(3):
+        page.keyboard.press("Shift+Tab")
     page.keyboard.press("ArrowRight")
     page.keyboard.press("Tab")
     page.keyboard.press("Space")

@@ -55,18 +55,46 @@ function written(value, unit) {
   return words.replace(/^-(?=0\.0+[^0-9])/, "");
 }
 
-/* A slider with its label and what it stands at, one of `values` if there are any; `read` sets it without a call of `onmove`. */
+/* The number that a text gives, as `written` writes it; NaN for any other text. */
+function parsed(text, unit) {
+  const number = text.trim().replace("−", "-").replace(unit === "rad" ? /\s*(°|deg)$/ : /\s*m$/, "");
+  return number === "" ? NaN : Number(number) * (unit === "rad" ? Math.PI / 180 : 1);
+}
+
+/* A slider with its label and its value, one of `values` if there are any; any other value with a unit can be typed.
+   `read` sets it without a call of `onmove`. */
 class Slider {
   constructor({ label, unit, min, max, value, steps = 200, values }, onmove, onset = () => {}) {
-    Object.assign(this, { unit, values });
-    const id = fresh("slider");
+    Object.assign(this, { label, unit, min, max, values });
+    const id = fresh("slider"), typed = unit && !values;
     this.input = element("input", { type: "range", id });
     Object.assign(this.input, values ? { max: values.length - 1 } : { min, max, step: unit ? (max - min) / steps || 1e-6 : 1 });
-    this.output = element("output", { for: id });
-    this.root = element("div", { className: "slider" }, element("label", { for: id, textContent: label }), this.output, this.input);
+    this.output = typed ? element("input", { type: "text", className: "typed", "aria-label": `${label}: value`, autocomplete: "off", spellcheck: false, size: 9 })
+      : element("output", { for: id });
+    this.wrong = typed ? element("p", { role: "alert", className: "wrong", id: fresh("wrong") }) : null;
+    this.root = element("div", { className: "slider" }, element("label", { for: id, textContent: label }), this.output, this.input, this.wrong);
     this.input.oninput = () => { const at = Number(this.input.value); this.told(values ? values[at] : at); onmove(this.value); };
     this.input.onchange = () => onset(this.value);
+    this.output.oninput = () => { this.typing = true; };
+    this.output.onchange = () => { if (this.take()) { onmove(this.value); onset(this.value); } };
     this.read(value);
+  }
+
+  /* Take the typed number, an end of the range where it is written like that; in one line why not. */
+  take() {
+    const { label, unit, min, max, output } = this, text = output.value.trim(), value = parsed(text, unit);
+    const inside = [min, max].find((end) => written(value, unit) === written(end, unit)) ?? (value >= min && value <= max ? value : NaN);
+    if (Number.isNaN(inside)) this.fail(`${label}: got ${text || "nothing"}, expected a number from ${written(min, unit)} to ${written(max, unit)}`);
+    else { this.typing = false; this.read(inside); }
+    return !Number.isNaN(inside);
+  }
+
+  /* One line below it. */
+  fail(words) {
+    if (!this.wrong) return;
+    this.wrong.textContent = words;
+    this.output.setAttribute("aria-invalid", Boolean(words));
+    this.output.setAttribute("aria-describedby", this.wrong.id);
   }
 
   read(value) {
@@ -74,12 +102,15 @@ class Slider {
     this.told(value);
   }
 
-  /* The value itself: what was read may lie between the steps of the input. */
+  /* The value itself: what was read may lie between the steps of the input. A text that is being typed stays. */
   told(value) {
     this.value = value;
     const words = this.unit ? written(value, this.unit) : String(value);
-    this.output.textContent = words;
     this.input.setAttribute("aria-valuetext", words);
+    if (this.typing && document.activeElement === this.output) return;
+    this.typing = false;
+    this.output.value = words;
+    this.fail("");
   }
 }
 

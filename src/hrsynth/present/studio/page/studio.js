@@ -103,6 +103,7 @@ class Studio {
     Object.assign(this, { robot: given, camera, scene, named: watch, here: scene.here ?? null });
     this.watch = scene.legs.filter(({ watched }) => watched).map(({ name }) => name);
     this.values = scene.values ?? scene.sliders.map(({ home }) => home);
+    this.motors = scene.motors;
     this.settled = String(this.values);
     clearTimeout(this.rest);
     $("name").textContent = scene.name;
@@ -162,7 +163,7 @@ class Studio {
     this.moving = true;
     const ask = () => ({ ...this.asked(), hidden: this.sees, ...fields });
     const robot = this.robot;
-    const answer = await this.link.ask("move", ask).catch((error) => { this.panels.move.status.fail(error.message); return null; });
+    const answer = await this.link.ask("move", ask).catch((error) => { this.panels.move.refused(error.message); return null; });
     this.pending -= 1;
     this.moving = this.pending > 0;
     if (!answer || robot !== this.robot) return;
@@ -170,7 +171,7 @@ class Studio {
   }
 
   arrive(answer) {
-    Object.assign(this, { here: answer.here, values: answer.values, state: answer.state });
+    Object.assign(this, { here: answer.here, values: answer.values, motors: answer.motors, state: answer.state });
     this.draw(answer.state);
     this.each("moved", answer);
     clearTimeout(this.rest);
