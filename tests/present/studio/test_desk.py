@@ -308,6 +308,11 @@ def test_a_servo_run_aims_at_the_configuration_that_was_set():
     assert found["kind"] == "assembly mode"
     assert there["kind"] == "goal"
     assert len(found["frames"]) >= 1
+    apart = np.array(found["frames"][-1]["image"]) - np.array(found["desired"])
+    pixels = np.sqrt((apart**2).sum(axis=-1)).max()
+    assert pixels > 10
+    assert f"up to {pixels:.0f} pixels" in found["words"]
+    assert "pixels" not in there["words"]
     open_ = {**goal, "q": [value + 0.1 for value in goal["q"]]}
     with pytest.raises(HrsynthError, match="end"):
         ask("servo", "3rrr_m1", end=open_)
