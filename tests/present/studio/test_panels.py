@@ -75,7 +75,7 @@ def show(page: Any, key: str) -> Any:
 
 def said(panel: Any) -> str:
     """The error that a panel shows."""
-    return str(panel.locator("[role=alert]").inner_text()).strip()
+    return " ".join(panel.locator("[role=alert]").all_inner_texts()).strip()
 
 
 def here(page: Any) -> Any:
@@ -488,6 +488,30 @@ def test_a_file_that_is_no_robot_is_one_line_and_the_robot_stays(tab: Tab, addre
     tab.complaints.clear()
 
 
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("where", ["#pane canvas", "#panel-robot .gallery"])
+def test_the_error_of_a_dropped_file_stands_where_it_was_dropped(size: str, where: str, tab: Tab, address: str):
+    page = opened(tab, address, "3rrr_m1", size)
+    show(page, "robot")
+    page.locator("#panel-robot").evaluate("(panel) => panel.scrollTo(0, panel.scrollHeight)")
+    page.locator(where).evaluate("""(place) => {
+      const dataTransfer = new DataTransfer();
+      dataTransfer.items.add(new File(["<robot name='bad'><link/></robot>"], "bad.urdf"));
+      place.dispatchEvent(new DragEvent("drop", { bubbles: true, cancelable: true, dataTransfer }));
+    }""")
+    line = page.locator("[role=alert]:not(:empty)")
+    line.wait_for(timeout=SLOW)
+    assert line.inner_text().count("bad.urdf") == 1
+    box, pane, panel = (
+        page.locator(each).bounding_box() for each in ("[role=alert]:not(:empty)", "#pane", "#panel-robot")
+    )
+    inside = pane if "canvas" in where else panel
+    assert inside["y"] <= box["y"]
+    assert box["y"] + box["height"] <= inside["y"] + inside["height"]
+    assert inside["x"] <= box["x"]
+    assert box["x"] + box["width"] <= inside["x"] + inside["width"]
+
+
 def test_a_file_is_named_as_it_is_called_and_long_words_are_in_sight(tab: Tab, address: str):
     page = enter(tab, address)
     drop(page, bad__urdf="<robot name='bad'><link/></robot>")
@@ -625,6 +649,77 @@ def test_without_a_robot_a_click_is_answered_in_one_line(tab: Tab, address: str)
     panel = show(page, "plane")
     panel.get_by_role("button", name="Draw the plane").click()
     assert said(panel) == "No robot is open. Choose one in the panel Robot."
+
+
+def look(page: Any) -> Any:
+    """Robot, legs, configuration and panel of the page."""
+    return page.evaluate("() => [studio.scene.name, studio.watch, studio.here.q, studio.tabs.chosen]")
+
+
+def test_a_link_restores_robot_legs_pose_and_panel(tab: Tab, address: str, quattro: str, browser: Any):
+    page = opened(tab, address, "delta")
+    show(page, "legs").locator("input[value='2']").click()
+    answered(page)
+    x = show(page, "move").locator(".typed:visible").first
+    x.fill("0.0321")
+    x.press("Enter")
+    answered(page)
+    show(page, "legs")
+    page.wait_for_timeout(500)
+    there, link = look(page), page.evaluate("location.hash")
+    assert there[:2] == ["delta", ["1", "3"]]
+    assert there[3] == "legs"
+    other = Tab.of(browser.new_page())  # another run of the program, which was started with another robot
+    other.open(quattro + link)
+    until(other.page, "() => window.studio?.scene")
+    answered(other.page)
+    assert look(other.page) == there
+    assert other.page.evaluate("studio.values[0]") == pytest.approx(0.0321)
+    assert other.page.locator("#lost-link").is_hidden()
+    show(other.page, "plane").get_by_role("button", name="Draw the plane").click()
+    answered(other.page)
+    panel = show(other.page, "export")
+    panel.locator("summary", has_text="Link").click()
+    sent = panel.locator(".line code", has_text="#robot").inner_text()
+    other.page.close()
+    assert other.complaints == []
+    page.locator("#tab-robot").click()
+    page.locator("[data-source='shipped:3rrr_m1']").click()
+    answered(page)
+    field = page.get_by_label("Open a link")
+    field.fill(f"http://127.0.0.1:1/secret/{sent}")
+    field.press("Enter")
+    until(page, "() => studio.scene.name === 'delta'")
+    answered(page)
+    assert look(page) == [*there[:3], "plane"]
+
+
+@pytest.mark.parametrize(
+    ("link", "words", "kept"),
+    [
+        ("#robot=shipped:nobody&panel=legs", "no such shipped robot: got 'nobody'", ("quattro", 4, "legs")),
+        ("#legs=1", "source of a robot", ("quattro", 4, "move")),
+        ("#robot=shipped:delta&legs=1,9&panel=legs", "9", ("delta", 3, "legs")),
+        ("#robot=shipped:delta&legs=1,2&pose=1,2&panel=modes", "coordinates", ("delta", 2, "modes")),
+        ("#robot=shipped:delta&legs=1&pose=1,a", "coordinates", ("delta", 1, "move")),
+        ("#robot=shipped:delta&legs=1&panel=door", "panel: got door", ("delta", 1, "move")),
+        ("#robot=shipped:delta&options=%7B", "options of a robot", ("quattro", 4, "move")),
+        ("#robot=given:other.urdf", "the robot of the command line: got 'quattro'", ("quattro", 4, "move")),
+    ],
+)
+def test_of_a_wrong_link_one_line_is_shown_and_the_rest_is_restored(
+    tab: Tab, quattro: str, link: str, words: str, kept: tuple[str, int, str]
+):
+    tab.open(quattro + link)
+    until(tab.page, "() => window.studio?.scene")
+    answered(tab.page)
+    line = tab.page.locator("#lost-link")
+    line.wait_for()
+    assert words in line.inner_text()
+    assert "\n" not in line.inner_text()
+    name, legs, _, panel = look(tab.page)
+    assert (name, len(legs), panel) == kept
+    assert said(tab.page.locator(f"#panel-{panel}")) == ""
 
 
 def test_a_lost_connection_is_told_and_mended(tab: Tab, address: str):

@@ -64,6 +64,7 @@ def describe_opened(request: Request) -> dict[str, Any]:
     return {
         **describe_stage(setup, [machine], list_arrows(setup, known.values())),
         "words": f"{words}, {setup.dof} dof",
+        "link": request.describe_link(),
         "legs": [_describe_leg(request, setup, leg) for leg in setup.decomposition.legs],
         "sliders": make_sliders(mover, request.ends),
         "motor_sliders": make_motor_sliders(mover),

@@ -114,17 +114,16 @@ class Slider {
   }
 }
 
-/* The command and the Python line that give the same, each with a button that copies it. */
+/* Texts by their keys and names, each with a button that copies it: the command and the Python line that give the same. */
 class Same {
-  constructor() {
-    this.root = element("details", { className: "same", hidden: true }, element("summary", { textContent: "Command and Python line" }));
-    this.rows = ["command", "python"].map((key) => this.row(key));
+  constructor(title = "Command and Python line", rows = [["command", "command"], ["python", "Python line"]]) {
+    this.root = element("details", { className: "same", hidden: true }, element("summary", { textContent: title }));
+    this.rows = rows.map(([key, name]) => this.row(key, name));
   }
 
-  row(key) {
+  row(key, name) {
     const code = element("code"), copied = element("span", { className: "copied", role: "status" });
-    const words = key === "command" ? "Copy the command" : "Copy the Python line";
-    const copy = button("Copy", () => this.copy(code, copied), { "aria-label": words });
+    const copy = button("Copy", () => this.copy(code, copied), { "aria-label": `Copy the ${name}` });
     const root = element("div", { className: "line" }, code, copy, copied);
     this.root.append(root);
     return { key, code, root };

@@ -24,13 +24,57 @@ class Studio {
     const made = kinds.map((Kind) => new Kind(this));
     this.panels = Object.fromEntries(made.map((panel) => [panel.key, panel]));
     document.body.classList.toggle("plain", !panels);
-    if (panels) this.tabs = new Tabs($("panels"), made, (key, before) => { this.panels[before]?.left(); this.panels[key].entered(); });
+    if (panels) this.tabs = new Tabs($("panels"), made, (key, before) => { this.panels[before]?.left(); this.panels[key].entered(); this.keep(); });
     else $("panels").append(...made.map(({ root }) => root));
     this.show(start ? "move" : "robot");
     this.panels.robot?.fill();
-    if (start) this.open(start, { watch, camera, hidden });
+    const wanted = this.tabs && Bookmark.read(location.hash);
+    if (this.tabs) addEventListener("hashchange", () => this.restore(Bookmark.read(location.hash)));
+    if (wanted) this.restore(wanted, () => start && this.open(start, { watch, camera, hidden }));
+    else if (start) this.open(start, { watch, camera, hidden });
     else { this.kept(); this.ready(); }
     this.act();
+  }
+
+  /* Open what a link holds; `otherwise` where its robot is not opened. */
+  async restore(wanted, otherwise = () => {}) {
+    if (!wanted) return;
+    const { source, options, panel, ...more } = wanted, { scene: before, panels, tabs: { chosen } } = this, { status } = panels.robot;
+    await this.open({ source, options }, { ...more, link: true });
+    const words = this.scene === before ? status.wrong.textContent : panel && !(panel in panels) ? `panel: got ${panel}, expected ${Object.keys(panels).join(", ")}` : "";
+    if (this.scene === before) {
+      status.clear();
+      await otherwise();
+    }
+    this.show(panel in panels ? panel : this.scene ? chosen : "robot");
+    if (words) this.notice(words);
+    this.keep();
+  }
+
+  /* Request the scene of a robot; of a link without what is refused: its pose, its legs and camera, or both. */
+  async request(asked, link) {
+    const bare = { watch: null, camera: null };
+    let refused = null;
+    for (const less of link ? [{}, { here: null }, bare, { ...bare, here: null }] : [{}]) {
+      const fields = { ...asked, ...less };
+      const scene = await this.link.ask("open", fields).catch((error) => ({ failed: error.message, error }));
+      if (scene?.failed) { refused ??= scene; continue; }
+      this.notice(refused?.failed);
+      return scene && { ...scene, asked: fields };
+    }
+    if (refused.error) throw refused.error;
+    return refused;
+  }
+
+  /* One line on what is wrong with a link. */
+  notice(words) {
+    $("lost-link").hidden = !words;
+    $("lost-link").textContent = words ? `The link is not restored as a whole. ${words}` : "";
+  }
+
+  /* The address holds what is shown. */
+  keep() {
+    if (this.tabs && this.scene) history.replaceState(null, "", Bookmark.of(this));
   }
 
   /* A click on what needs a robot waits while one is being read. */
@@ -94,13 +138,15 @@ class Studio {
     this.act();
   }
 
-  async read(robot, { watch = null, camera = null, hidden = false }) {
+  async read(robot, { watch = null, camera = null, here = null, hidden = false, link = false }) {
     const given = { source: robot.source, options: robot.options || {} };
     const { status } = this.panels.robot || this.panels.move;
-    const scene = await status.during(this.link.ask("open", { robot: given, watch, camera, here: null }), "Reading the robot", () => this.link.cancel("open"));
+    const scene = await status.during(this.request({ robot: given, watch, camera, here }, link), "Reading the robot", () => this.link.cancel("open"));
     this.ready();
     if (!scene || scene.failed) { this.kept(); this.panels.robot?.failed(scene, given); return; }
-    Object.assign(this, { robot: given, camera, scene, named: watch, here: scene.here ?? null });
+    const { asked } = scene;
+    Object.assign(this, { robot: given, camera: asked.camera, scene, named: asked.watch, here: scene.here ?? null });
+    this.zero = asked.here ? null : String(scene.here?.q);
     this.watch = scene.legs.filter(({ watched }) => watched).map(({ name }) => name);
     this.values = scene.values ?? scene.sliders.map(({ home }) => home);
     this.motors = scene.motors;
@@ -117,6 +163,7 @@ class Studio {
     this.stage.fit();
     this.relegend();
     this.say(`${scene.name} is open: ${scene.words}.`);
+    this.keep();
     this.answer();
     this.link.ask("move", this.asked(), "first").catch(() => {});  /* the process that moves it reads the robot now */
     if (hidden) this.reveal();
@@ -175,11 +222,13 @@ class Studio {
     this.draw(answer.state);
     this.each("moved", answer);
     clearTimeout(this.rest);
-    if (!this.moving && String(this.values) !== this.settled) this.rest = setTimeout(() => this.settle(), Studio.REST);
+    if (!this.moving) this.rest = setTimeout(() => this.settle(), Studio.REST);
   }
 
   /* Settled at another pose: results that depend on it are requested anew. */
   settle() {
+    this.keep();
+    if (String(this.values) === this.settled) return;
     this.settled = String(this.values);
     this.each("settled");
   }
@@ -208,6 +257,7 @@ class Studio {
     Object.assign(this, { watch: names, named: null });
     this.stage.watch(names);
     this.judge(null);
+    this.keep();
     this.each("rewatched", names);
   }
 
