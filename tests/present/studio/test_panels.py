@@ -280,7 +280,7 @@ def test_numbers_are_typed_beside_the_sliders(tab: Tab, address: str):
     phi.blur()
     answered(page)
     assert page.evaluate("() => studio.values") == pytest.approx([0.0123, home[1], -math.radians(5)], abs=1e-6)
-    assert (x.input_value(), phi.input_value()) == ("0.0123 m", "-5.0°")
+    assert (x.input_value(), phi.input_value()) == ("0.0123\xa0m", "-5.0°")
     for text, got in (("9", "x: got 9, expected a number from -"), ("far", "got far"), ("", "got nothing")):
         x.fill(text)
         x.press("Enter")
@@ -343,6 +343,28 @@ def test_a_mode_is_flown_to_and_back(tab: Tab, address: str):
     panel.get_by_role("button", name="Back to the previous pose").click()
     answered(page)
     assert page.evaluate("() => studio.values") == pytest.approx(before, abs=1e-6)
+
+
+def test_labels_in_the_3d_view_can_be_read_in_a_small_pane(tab: Tab, address: str):
+    """And the legend has no goal where none is drawn."""
+    page = opened(tab, address, "quattro", "narrow")
+    show(page, "servo").get_by_role("button", name="Set here: the goal").click()
+    show(page, "modes")
+    answered(page)
+    page.wait_for_timeout(500)
+    heights = page.evaluate("""() => {
+      const found = [], { sight, world, canvas } = studio.stage;
+      world.traverseVisible((mesh) => {
+        if (!mesh.isSprite) return;
+        const [low, high] = [-0.5, 0.5].map((by) => mesh.getWorldPosition(new THREE.Vector3())
+          .applyMatrix4(sight.camera.matrixWorldInverse).add(new THREE.Vector3(0, by * mesh.scale.y, 0)).applyMatrix4(sight.camera.projectionMatrix).y);
+        found.push((high - low) / 2 * canvas.clientHeight);
+      });
+      return found;
+    }""")
+    assert len(heights) > 6
+    assert min(heights) > 21
+    assert "goal" not in page.locator("#legend").text_content()
 
 
 def test_a_run_is_set_played_and_scrubbed(tab: Tab, address: str):

@@ -51,7 +51,7 @@ function tick(words, checked, onchange) {
 /* A number in the unit that people read: degrees for radians. */
 function written(value, unit) {
   if (value === null || value === undefined) return "";
-  const words = unit === "rad" ? `${(value * 180 / Math.PI).toFixed(1)}°` : `${value.toFixed(4)} ${unit}`;
+  const words = unit === "rad" ? `${(value * 180 / Math.PI).toFixed(1)}°` : `${value.toFixed(4)}\u00a0${unit}`;
   return words.replace(/^-(?=0\.0+[^0-9])/, "");
 }
 
