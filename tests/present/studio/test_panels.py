@@ -356,8 +356,9 @@ def test_labels_in_the_3d_view_can_be_read_in_a_small_pane(tab: Tab, address: st
       const found = [], { sight, world, canvas } = studio.stage;
       world.traverseVisible((mesh) => {
         if (!mesh.isSprite) return;
-        const [low, high] = [-0.5, 0.5].map((by) => mesh.getWorldPosition(new THREE.Vector3())
-          .applyMatrix4(sight.camera.matrixWorldInverse).add(new THREE.Vector3(0, by * mesh.scale.y, 0)).applyMatrix4(sight.camera.projectionMatrix).y);
+        const place = mesh.getWorldPosition(new THREE.Vector3()).applyMatrix4(sight.camera.matrixWorldInverse);
+        const [low, high] = [-0.5, 0.5].map((by) => place.clone().add(new THREE.Vector3(0, by * mesh.scale.y, 0))
+          .applyMatrix4(sight.camera.projectionMatrix).y);
         found.push((high - low) / 2 * canvas.clientHeight);
       });
       return found;

@@ -30,7 +30,7 @@ class RobotPanel extends Panel {
     this.studio.show("robot");
     if ($("sight").contains(event.target)) $("sight").append(this.status.root);
     else this.drop.after(this.status.root);
-    this.status.root.scrollIntoView({ block: "nearest" });
+    this.drop.scrollIntoView({ block: "nearest" });
     this.take([...event.dataTransfer.files]);
   }
 
