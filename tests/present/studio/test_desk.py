@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shlex
 from base64 import b64decode
 from pathlib import Path
@@ -74,6 +75,39 @@ def test_a_platform_is_drawn_to_the_nearest_pose_that_it_can_have():
     assert again["residual"] < CLOSED
 
 
+@pytest.mark.some(2)
+@pytest.mark.parametrize("robot", ["delta", "3ppr_m2", "quattro", "gough_stewart"])
+def test_motors_move_the_robot_as_a_pose_by_motors_does(robot: str, capsys: pytest.CaptureFixture[str]):
+    sliders = ask("open", robot)["motor_sliders"]
+    wanted = [each["home"] + 0.02 * (i + 1) for i, each in enumerate(sliders)]
+    far = ask("move", robot, motors=[each["home"] - 0.01 for each in sliders])
+    moved = ask("move", robot, motors=wanted, here=far["here"], hidden=True)
+    ran = run(moved["command"], capsys)["configurations"][0]
+    assert moved["motors"] == pytest.approx(wanted, abs=1e-9)
+    assert moved["values"][:2] == pytest.approx([ran["pose"]["x"], ran["pose"]["y"]], abs=1e-8)
+    assert [*ran["coordinates"]["motors"].values()] == pytest.approx(wanted)
+    assert moved["residual"] < CLOSED
+    assert (moved["here"]["hidden"] is None) == (ask("move", robot, hidden=True)["here"]["hidden"] is None)
+
+
+def test_a_motor_slider_has_the_limits_of_the_file(tmp_path: Path):
+    sliders = ask("open", "3prr_m1")["motor_sliders"]
+    assert [each["name"] for each in sliders] == ["guide_1", "guide_2", "guide_3"]
+    file = tmp_path / "limited.urdf"
+    save(load("3prr_m1"), file)
+    limit = '<limit lower="-0.01" upper="0.02" effort="1" velocity="1"/>'
+    text = re.sub('(name="guide_2".*?)<limit.*?/>', rf"\1{limit}", file.read_text(), count=1, flags=re.DOTALL)
+    file.write_text(text)
+    limited = AnalysisService(folder=tmp_path).answer({"ask": "open", "robot": {"source": "folder:limited.urdf"}})
+    assert [(each["min"], each["max"]) for each in limited["motor_sliders"]] == [
+        pytest.approx((each["min"], each["max"]) if each["name"] != "guide_2" else (-0.01, 0.02)) for each in sliders
+    ]
+    with pytest.raises(HrsynthError, match="limit"):
+        AnalysisService(folder=tmp_path).answer(
+            {"ask": "move", "robot": {"source": "folder:limited.urdf"}, "motors": [0.0, 0.03, 0.0]}
+        )
+
+
 def test_what_no_leg_stands_for_is_asked_for_by_its_link():
     """A link named when the robot was opened stays the one that is watched, whatever legs are ticked."""
     legs = {leg["name"]: leg for leg in ask("open", "quattro", watch=["rod_1b", "2"])["legs"]}
@@ -128,6 +162,9 @@ def test_what_is_no_question_is_refused_in_a_line(asked: Any):
         {"values": [1e400, 0.0]},
         {"values": ["0", 0.0]},
         {"values": [0.0, 0.0], "platform": [0.0] * 7},
+        {"values": [0.0, 0.0], "motors": [0.0, 0.0]},
+        {"motors": [0.0]},
+        {"motors": [1e8, 0.0]},
         {"platform": [0.0] * 7},
         {"watch": "1"},
         {"watch": ["9"]},
@@ -219,6 +256,29 @@ def test_a_plane_has_the_errors_that_moving_there_shows(robot: str, of: str):
     assert np.shape(found["corners"]) == (4, 3)
 
 
+@pytest.mark.some(1, 3)
+@pytest.mark.parametrize("robot", ["delta", "quattro", "orthoglide", "3rrr_m1", "gough_stewart"])
+def test_a_plane_of_a_moved_pose_is_as_fine_as_that_of_the_zero_configuration(robot: str):
+    """And has the errors that moving there shows."""
+    scene = ask("open", robot)
+    sliders, away = scene["sliders"], [each["home"] + 0.2 * (each["max"] - each["home"]) for each in scene["sliders"]]
+    moved = ask("move", robot, values=away)
+    assert not moved["stopped"]
+    plane = ask("plane", robot, here=moved["here"], size=24)
+    assert plane["n"] == ask("plane", robot, size=24)["n"] == 24
+    assert "one by one" not in plane["words"]
+    first, second = (next(each for each in sliders if each["name"] == name) for name in plane["of"])
+    near = [
+        round(23 * (value - each["min"]) / (each["max"] - each["min"]))
+        for value, each in zip(away, sliders, strict=True)
+    ]
+    column, row = near[sliders.index(first)], near[sliders.index(second)]
+    for each, cell in ((first, column), (second, row)):
+        away[sliders.index(each)] = each["min"] + cell / 23 * (each["max"] - each["min"])
+    there = ask("move", robot, here=moved["here"], values=away)["state"]["error"]
+    assert plane["values"][row][column] == pytest.approx(there[there["unit"]], rel=2e-2)
+
+
 def test_in_another_mode_no_command_is_told_that_gives_something_else():
     other = ask("modes", "rrrrr_m1")["modes"][1]["here"]
     found = ask("modes", "rrrrr_m1", here=other)
@@ -248,6 +308,11 @@ def test_a_servo_run_aims_at_the_configuration_that_was_set():
     assert found["kind"] == "assembly mode"
     assert there["kind"] == "goal"
     assert len(found["frames"]) >= 1
+    apart = np.array(found["frames"][-1]["image"]) - np.array(found["desired"])
+    pixels = np.sqrt((apart**2).sum(axis=-1)).max()
+    assert pixels > 10
+    assert f"up to {pixels:.0f} pixels" in found["words"]
+    assert "pixels" not in there["words"]
     open_ = {**goal, "q": [value + 0.1 for value in goal["q"]]}
     with pytest.raises(HrsynthError, match="end"):
         ask("servo", "3rrr_m1", end=open_)

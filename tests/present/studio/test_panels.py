@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -74,7 +75,7 @@ def show(page: Any, key: str) -> Any:
 
 def said(panel: Any) -> str:
     """The error that a panel shows."""
-    return str(panel.locator("[role=alert]").inner_text()).strip()
+    return " ".join(panel.locator("[role=alert]").all_inner_texts()).strip()
 
 
 def here(page: Any) -> Any:
@@ -266,6 +267,66 @@ def test_a_slider_moves_its_own_freedom_alone(tab: Tab, address: str):
     assert values[2] > home[2]
 
 
+def test_numbers_are_typed_beside_the_sliders(tab: Tab, address: str):
+    page = opened(tab, address, "3rrr_m1")
+    panel = show(page, "move")
+    x, _, phi = panel.locator(".typed:visible").all()
+    first = panel.locator(".slider").first
+    home = page.evaluate("() => studio.values")
+    x.fill("0.0123")
+    x.press("Enter")
+    answered(page)
+    phi.fill("-5 deg")
+    phi.blur()
+    answered(page)
+    assert page.evaluate("() => studio.values") == pytest.approx([0.0123, home[1], -math.radians(5)], abs=1e-6)
+    assert (x.input_value(), phi.input_value()) == ("0.0123\xa0m", "-5.0°")
+    for text, got in (("9", "x: got 9, expected a number from -"), ("far", "got far"), ("", "got nothing")):
+        x.fill(text)
+        x.press("Enter")
+        line = first.locator("[role=alert]")
+        assert got in line.inner_text()
+        assert "\n" not in line.inner_text()
+        assert line.bounding_box()["y"] - x.bounding_box()["y"] < 80
+        assert x.get_attribute("aria-invalid") == "true"
+    assert page.evaluate("() => studio.values")[0] == pytest.approx(0.0123, abs=1e-6)
+    panel.get_by_role("button", name="Zero configuration").click()
+    answered(page)
+    assert said(first) == ""
+
+
+def test_a_motor_moves_the_robot_until_its_line_stops(tab: Tab, address: str):
+    from hrsynth import check
+    from hrsynth.errors import PoseReachFailure
+
+    page = opened(tab, address, "quattro")
+    panel = show(page, "move")
+    panel.get_by_role("radio", name="Motors").check()
+    sliders = panel.locator(".slider:visible")
+    assert sliders.locator("label").all_inner_texts() == [f"shoulder_{i}" for i in (1, 2, 3, 4)]
+    second = sliders.nth(1)
+    second.locator(".typed").fill("10")
+    second.locator(".typed").press("Enter")
+    answered(page)
+    reached = check("quattro", at={"motors": {"shoulder_2": math.radians(10)}}).to_dict()["configurations"][0]["pose"]
+    there = page.evaluate("() => studio.values")
+    assert there[:3] == pytest.approx([reached[name] for name in "xyz"], abs=1e-6)
+    first = sliders.first
+    first.locator(".typed").fill("170")
+    first.locator(".typed").press("Enter")
+    answered(page)
+    with pytest.raises(PoseReachFailure) as stopped:
+        check("quattro", at={"motors": [math.radians(170), math.radians(10), 0, 0]})
+    assert said(first) == str(stopped.value)
+    assert first.locator(".typed").input_value() == "0.0°"
+    assert page.evaluate("() => studio.values") == there
+    first.get_by_role("slider").focus()
+    page.keyboard.press("ArrowRight")
+    answered(page)
+    assert said(first) == ""
+    assert page.evaluate("() => studio.motors[0]") > 0
+
+
 def test_a_mode_is_flown_to_and_back(tab: Tab, address: str):
     page = opened(tab, address, "rrrrr_m1")
     before = page.evaluate("() => studio.values")
@@ -282,6 +343,29 @@ def test_a_mode_is_flown_to_and_back(tab: Tab, address: str):
     panel.get_by_role("button", name="Back to the previous pose").click()
     answered(page)
     assert page.evaluate("() => studio.values") == pytest.approx(before, abs=1e-6)
+
+
+def test_labels_in_the_3d_view_can_be_read_in_a_small_pane(tab: Tab, address: str):
+    """And the legend has no goal where none is drawn."""
+    page = opened(tab, address, "quattro", "narrow")
+    show(page, "servo").get_by_role("button", name="Set here: the goal").click()
+    show(page, "modes")
+    answered(page)
+    page.wait_for_timeout(500)
+    heights = page.evaluate("""() => {
+      const found = [], { sight, world, canvas } = studio.stage;
+      world.traverseVisible((mesh) => {
+        if (!mesh.isSprite) return;
+        const place = mesh.getWorldPosition(new THREE.Vector3()).applyMatrix4(sight.camera.matrixWorldInverse);
+        const [low, high] = [-0.5, 0.5].map((by) => place.clone().add(new THREE.Vector3(0, by * mesh.scale.y, 0))
+          .applyMatrix4(sight.camera.projectionMatrix).y);
+        found.push((high - low) / 2 * canvas.clientHeight);
+      });
+      return found;
+    }""")
+    assert len(heights) > 6
+    assert min(heights) > 21
+    assert "goal" not in page.locator("#legend").text_content()
 
 
 def test_a_run_is_set_played_and_scrubbed(tab: Tab, address: str):
@@ -328,12 +412,14 @@ def test_keys_are_enough(tab: Tab, address: str):
         assert page.locator(f"#panel-{key}").is_visible()
     page.keyboard.press("ArrowRight")
     answered(page)
-    page.keyboard.press("Tab")
+    for _ in range(3):  # the coordinates, the number, the slider
+        page.keyboard.press("Tab")
     before = here(page)
     page.keyboard.press("ArrowRight")
     answered(page)
     assert here(page) != before
-    page.keyboard.press("Shift+Tab")
+    for _ in range(3):
+        page.keyboard.press("Shift+Tab")
     page.keyboard.press("ArrowRight")
     page.keyboard.press("Tab")
     page.keyboard.press("Space")
@@ -425,6 +511,30 @@ def test_a_file_that_is_no_robot_is_one_line_and_the_robot_stays(tab: Tab, addre
     tab.complaints.clear()
 
 
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("where", ["#pane canvas", "#panel-robot .gallery"])
+def test_the_error_of_a_dropped_file_stands_where_it_was_dropped(size: str, where: str, tab: Tab, address: str):
+    page = opened(tab, address, "3rrr_m1", size)
+    show(page, "robot")
+    page.locator("#panel-robot").evaluate("(panel) => panel.scrollTo(0, panel.scrollHeight)")
+    page.locator(where).evaluate("""(place) => {
+      const dataTransfer = new DataTransfer();
+      dataTransfer.items.add(new File(["<robot name='bad'><link/></robot>"], "bad.urdf"));
+      place.dispatchEvent(new DragEvent("drop", { bubbles: true, cancelable: true, dataTransfer }));
+    }""")
+    line = page.locator("[role=alert]:not(:empty)")
+    line.wait_for(timeout=SLOW)
+    assert line.inner_text().count("bad.urdf") == 1
+    box, pane, panel = (
+        page.locator(each).bounding_box() for each in ("[role=alert]:not(:empty)", "#pane", "#panel-robot")
+    )
+    inside = pane if "canvas" in where else panel
+    assert inside["y"] <= box["y"]
+    assert box["y"] + box["height"] <= inside["y"] + inside["height"]
+    assert inside["x"] <= box["x"]
+    assert box["x"] + box["width"] <= inside["x"] + inside["width"]
+
+
 def test_a_file_is_named_as_it_is_called_and_long_words_are_in_sight(tab: Tab, address: str):
     page = enter(tab, address)
     drop(page, bad__urdf="<robot name='bad'><link/></robot>")
@@ -487,6 +597,152 @@ def test_a_slow_ask_says_so_and_is_cancelled_and_a_newer_one_replaces_it(tab: Ta
     show(page, "legs").get_by_role("checkbox").first.uncheck()
     answered(page)
     assert page.locator("#panel-legs .verdict").inner_text()
+
+
+def hold(page: Any, kind: str) -> list[Any]:
+    """Hold the requests of a kind; calling what is listed sends them."""
+    held: list[Any] = []
+
+    def between(route: Any) -> None:
+        server = route.connect_to_server()
+        route.on_message(
+            lambda message: (
+                held.append(lambda: server.send(message)) if f'"{kind}"' in message else server.send(message)
+            )
+        )
+        server.on_message(route.send)
+
+    page.route_web_socket(re.compile("/live$"), between)
+    return held
+
+
+def release(page: Any, held: list[Any]) -> None:
+    """Send the one request that is held, once it is there."""
+    until(page, "() => studio.link.lanes.desk.sent?.kind === 'open'")
+    page.wait_for_timeout(100)
+    (send,) = held
+    send()
+
+
+@pytest.fixture(scope="module")
+def quattro() -> Iterator[str]:
+    """The page of a server that was opened with a robot."""
+    from hrsynth.present.studio.server import studio
+
+    server = studio("quattro", open_=False)
+    yield server.address
+    server.stop()
+
+
+def test_a_plane_requested_before_the_robot_is_read_is_drawn(tab: Tab, quattro: str):
+    held = hold(tab.page, "open")
+    tab.open(quattro)
+    panel = show(tab.page, "plane")
+    panel.get_by_role("button", name="Draw the plane").dblclick()
+    assert "once the robot is read" in panel.locator("[role=status]").first.inner_text()
+    release(tab.page, held)
+    until(tab.page, "() => studio.panels.plane.record")
+    answered(tab.page)
+    assert said(panel) == ""
+
+
+def test_every_button_clicked_before_the_robot_is_read_acts_once(tab: Tab, quattro: str):
+    held = hold(tab.page, "open")
+    tab.open(quattro)
+    tab.page.locator("#tab-move").wait_for(timeout=SLOW)
+    tab.page.evaluate("""() => { window.acted = [];
+      for (const each of document.querySelectorAll("#tools button, .panel:not(.panel-robot) .body button"))
+        each.onclick = () => acted.push(each.textContent); }""")
+    clicked = []
+    for key in PANELS[1:]:
+        for each in show(tab.page, key).locator(".body button:enabled").all():
+            if each.is_visible():
+                clicked.append(each.inner_text())
+                each.click()
+    tab.page.get_by_role("button", name="Fit").click()
+    assert {"Draw the plane", "Zero configuration", "Find modes of this pose", "Report"} <= {*clicked}
+    assert tab.page.evaluate("acted") == []
+    release(tab.page, held)
+    answered(tab.page)
+    assert tab.page.evaluate("acted") == [*clicked, "Fit"]
+
+
+def test_without_a_robot_a_click_is_answered_in_one_line(tab: Tab, address: str):
+    page = enter(tab, address)
+    panel = show(page, "plane")
+    panel.get_by_role("button", name="Draw the plane").click()
+    assert said(panel) == "No robot is open. Choose one in the panel Robot."
+
+
+def look(page: Any) -> Any:
+    """Robot, legs, configuration and panel of the page."""
+    return page.evaluate("() => [studio.scene.name, studio.watch, studio.here.q, studio.tabs.chosen]")
+
+
+def test_a_link_restores_robot_legs_pose_and_panel(tab: Tab, address: str, quattro: str, browser: Any):
+    page = opened(tab, address, "delta")
+    show(page, "legs").locator("input[value='2']").click()
+    answered(page)
+    x = show(page, "move").locator(".typed:visible").first
+    x.fill("0.0321")
+    x.press("Enter")
+    answered(page)
+    show(page, "legs")
+    page.wait_for_timeout(500)
+    there, link = look(page), page.evaluate("location.hash")
+    assert there[:2] == ["delta", ["1", "3"]]
+    assert there[3] == "legs"
+    other = Tab.of(browser.new_page())  # another run of the program, which was started with another robot
+    other.open(quattro + link)
+    until(other.page, "() => window.studio?.scene")
+    answered(other.page)
+    assert look(other.page) == there
+    assert other.page.evaluate("studio.values[0]") == pytest.approx(0.0321)
+    assert other.page.locator("#lost-link").is_hidden()
+    show(other.page, "plane").get_by_role("button", name="Draw the plane").click()
+    answered(other.page)
+    panel = show(other.page, "export")
+    panel.locator("summary", has_text="Link").click()
+    sent = panel.locator(".line code", has_text="#robot").inner_text()
+    other.page.close()
+    assert other.complaints == []
+    page.locator("#tab-robot").click()
+    page.locator("[data-source='shipped:3rrr_m1']").click()
+    answered(page)
+    field = page.get_by_label("Open a link")
+    field.fill(f"http://127.0.0.1:1/secret/{sent}")
+    field.press("Enter")
+    until(page, "() => studio.scene.name === 'delta'")
+    answered(page)
+    assert look(page) == [*there[:3], "plane"]
+
+
+@pytest.mark.parametrize(
+    ("link", "words", "kept"),
+    [
+        ("#robot=shipped:nobody&panel=legs", "no such shipped robot: got 'nobody'", ("quattro", 4, "legs")),
+        ("#legs=1", "source of a robot", ("quattro", 4, "move")),
+        ("#robot=shipped:delta&legs=1,9&panel=legs", "9", ("delta", 3, "legs")),
+        ("#robot=shipped:delta&legs=1,2&pose=1,2&panel=modes", "coordinates", ("delta", 2, "modes")),
+        ("#robot=shipped:delta&legs=1&pose=1,a", "coordinates", ("delta", 1, "move")),
+        ("#robot=shipped:delta&legs=1&panel=door", "panel: got door", ("delta", 1, "move")),
+        ("#robot=shipped:delta&options=%7B", "options of a robot", ("quattro", 4, "move")),
+        ("#robot=given:other.urdf", "the robot of the command line: got 'quattro'", ("quattro", 4, "move")),
+    ],
+)
+def test_of_a_wrong_link_one_line_is_shown_and_the_rest_is_restored(
+    tab: Tab, quattro: str, link: str, words: str, kept: tuple[str, int, str]
+):
+    tab.open(quattro + link)
+    until(tab.page, "() => window.studio?.scene")
+    answered(tab.page)
+    line = tab.page.locator("#lost-link")
+    line.wait_for()
+    assert words in line.inner_text()
+    assert "\n" not in line.inner_text()
+    name, legs, _, panel = look(tab.page)
+    assert (name, len(legs), panel) == kept
+    assert said(tab.page.locator(f"#panel-{panel}")) == ""
 
 
 def test_a_lost_connection_is_told_and_mended(tab: Tab, address: str):

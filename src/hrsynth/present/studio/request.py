@@ -109,11 +109,13 @@ class Request(Value):
             if name not in list_robots():
                 raise BadRequest("no such shipped robot", name, "a name of the gallery")
             return RobotSource(name, options)
-        if kind == GIVEN and not name:
+        if kind == GIVEN:
             if self.given is None:
                 raise BadRequest(
                     "source given: the command line names no robot", remedy="Choose a robot of the gallery."
                 )
+            if name not in ("", self.given_name):
+                raise BadRequest("the robot of the command line", self.given_name, name)
             own = {**dict(_list_options(self.given.get("options"))), **dict(options)}
             return _find_source(str(self.given["robot"]), tuple(sorted(own.items())))
         if kind == PREFIX.removesuffix(":"):
@@ -121,6 +123,19 @@ class Request(Value):
         if self.fence is None:
             raise BadRequest("source of a robot", said.get("source"), "shipped:NAME, file:NAME, folder:NAME or given")
         return _find_source(str(locate_inside(self.fence, name)), options)
+
+    @property
+    def given_name(self) -> str:
+        """Return the name of the robot of the command line, of a file without its folder."""
+        return "" if self.given is None else Path(str(self.given["robot"])).name
+
+    def describe_link(self) -> dict[str, Any]:
+        """Return source and options of the robot for a link, which may be opened by another server."""
+        said = str(self.fields["robot"]["source"])
+        if said.partition(":")[0] == GIVEN:
+            robot = self.source.robot
+            said = f"{SHIPPED}:{robot}" if robot in list_robots() else f"{GIVEN}:{self.given_name}"
+        return {"source": said, "options": dict(self.source.options)}
 
     @cached_property
     def fence(self) -> Path | None:

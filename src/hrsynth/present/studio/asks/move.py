@@ -1,4 +1,5 @@
-"""Motion of the robot with closed loops: by sliders, by its platform, to a known or the zero configuration."""
+"""Motion of the robot with closed loops: by sliders, by its motors or its platform, to a known or the zero
+configuration."""
 
 from __future__ import annotations
 
@@ -9,10 +10,13 @@ import numpy as np
 from ....errors import BadRequest
 from ....geometry.so3 import convert_from_quaternion
 from ....geometry.vectors import build_pose
+from ....kinematics.joint_coordinates import list_coordinate_joints, read_joints, track_to_joints
 from ....kinematics.limits import list_joints_beyond
+from ....mechanism.pose import JointPose
 from ....tolerances import SLIDER_TARGET_TOL
 from ...view.scale import choose_error_unit, describe_no_error, describe_pose_error
 from ...view.states import SLIDER_DISTANCE_MAX, Mover, RealAndHiddenState
+from ..commands import format_commands
 from ..request import Request
 
 LINK_POSE_NUMBERS_COUNT = 7
@@ -21,13 +25,14 @@ LINK_POSE_NUMBERS_COUNT = 7
 
 def answer(request: Request) -> dict[str, Any]:
     """Move the robot from ``here`` to the slider ``values``, or its platform to the displacement ``platform`` from the
-    zero configuration; without either, describe ``here``."""
+    zero configuration, or from the zero configuration to the coordinates ``motors``; without any, describe ``here``."""
     mover = request.mover(request.has_flag("hidden"))
     here = request.here(mover)
     values = request.vector("values", len(mover.coordinates.places))
     place = request.vector("platform", LINK_POSE_NUMBERS_COUNT)
-    if values is not None and place is not None:
-        raise BadRequest("values and platform: both are given", remedy="Give one of them.")
+    given = [name for name in ("values", "platform", "motors") if request.fields.get(name) is not None]
+    if len(given) > 1:
+        raise BadRequest("more than one target", given, "one of them")
     if values is not None:
         if mover.is_beyond_sliders(values):
             raise BadRequest("values", values.tolist(), "values within reach of the sliders")
@@ -37,6 +42,8 @@ def answer(request: Request) -> dict[str, Any]:
         )
     if place is not None:
         return _draw_pose(request, mover, here, place)
+    if given:
+        return _drive_motors(request, mover)
     return describe_pose(request, mover, here)
 
 
@@ -56,12 +63,34 @@ def _draw_pose(request: Request, mover: Mover, here: RealAndHiddenState, place: 
     return describe_pose(request, mover, found, bool(apart > SLIDER_TARGET_TOL))
 
 
+def _drive_motors(request: Request, mover: Mover) -> dict[str, Any]:
+    motors = request.vector("motors", len(read_motors(mover.home)))
+    assert motors is not None
+    asked = JointPose.of("motors", motors.tolist())
+    at, _ = track_to_joints(mover.home.real, mover.setup.motion, asked)
+    return {
+        **describe_pose(request, mover, mover.with_hidden(at)),
+        **format_commands(request, "check", at=str(asked)),
+    }
+
+
+def read_motors(posed: RealAndHiddenState) -> list[float]:
+    """Return the coordinates of the motors, as the file counts them, in its order."""
+    robot, coordinates = posed.real.model.mechanism, read_joints(posed.real)
+    return [
+        value
+        for joint in list_coordinate_joints(robot.written or robot, motors=True)
+        for value in coordinates.get(joint.name, ())
+    ]
+
+
 def describe_pose(request: Request, mover: Mover, posed: RealAndHiddenState, stopped: bool = False) -> dict[str, Any]:
     """Return a configuration with all that is shown of it; ``stopped``: it did not reach its target."""
     return {
         "state": describe_state(request, mover, posed),
         "here": request.describe_here(posed),
         "values": mover.read(posed).tolist(),
+        "motors": read_motors(posed),
         "stopped": stopped,
         "residual": posed.real.residual,
     }

@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+import numpy as np
+
 from ....analysis.observed import ObservedRobot
 from ....analysis.setup_records import describe_other_modes
 from ....description import find_robot_file
 from ....description.assembly.choices import ImportChoices, choices
 from ....description.overrides import UNITS, Overrides
 from ....errors import HrsynthError, NoSegment
+from ....kinematics.joint_coordinates import list_coordinate_joints
 from ....mechanism.legs import Leg
 from ....mechanism.sensors import choose_default_segment, explain_default
 from ...view.meshes import collect_meshes
@@ -20,7 +23,7 @@ from ...view.states import REAL, Mover, RealAndHiddenState
 from ...view.view import build_machine, describe_stage, list_arrows
 from ..commands import format_commands
 from ..request import Request
-from .move import describe_pose
+from .move import describe_pose, read_motors
 
 ASSUMPTION_CANDIDATES_MAX = 30
 """Largest number of alternatives to an assumption that are offered."""
@@ -61,8 +64,10 @@ def describe_opened(request: Request) -> dict[str, Any]:
     return {
         **describe_stage(setup, [machine], list_arrows(setup, known.values())),
         "words": f"{words}, {setup.dof} dof",
+        "link": request.describe_link(),
         "legs": [_describe_leg(request, setup, leg) for leg in setup.decomposition.legs],
         "sliders": make_sliders(mover, request.ends),
+        "motor_sliders": make_motor_sliders(mover),
         "scale": scale(choose_error_unit(setup)),
         **describe_pose(request, mover, here),
         "notes": [*map(str, setup.robot.notes), *describe_other_modes(setup), *missing],
@@ -85,6 +90,32 @@ def make_sliders(mover: Mover, ends: Sequence[tuple[RealAndHiddenState, RealAndH
                 "unit": "rad" if place >= 3 else "m",
                 "min": round(low, PAGE_DIGITS_COUNT),
                 "max": round(high, PAGE_DIGITS_COUNT),
+                "home": home,
+            }
+        )
+    return made
+
+
+def make_motor_sliders(mover: Mover) -> list[dict[str, Any]]:
+    """Return a slider for each coordinate of a motor, within its limits; without limits over half a turn or the
+    characteristic length, in each direction."""
+    at = mover.home.real
+    robot = at.model.mechanism.written or at.model.mechanism
+    axes = [
+        (joint, axis) for joint in list_coordinate_joints(robot, motors=True) for axis in range(joint.type.freedoms)
+    ]
+    made = []
+    for (joint, axis), home in zip(axes, read_motors(mover.home), strict=False):
+        slides = joint.type.has_translation and axis == 0
+        span = at.model.length if slides else np.pi
+        low, high = robot.filed.get(joint.name, (-np.inf, np.inf))
+        made.append(
+            {
+                "name": joint.name,
+                "label": joint.name if joint.type.freedoms == 1 else f"{joint.name} {axis + 1}",
+                "unit": "m" if slides else "rad",
+                "min": low if np.isfinite(low) else home - span,
+                "max": high if np.isfinite(high) else home + span,
                 "home": home,
             }
         )

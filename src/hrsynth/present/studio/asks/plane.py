@@ -128,12 +128,16 @@ def _pair(mover: Mover, said: str | None) -> tuple[int, int]:
 
 
 def _is_closed_form_solution(mover: Mover, at: ClosedConfiguration) -> bool:
-    """Return True if a configuration is that of the closed forms at its pose."""
-    placer = mover.setup.placer
+    """Return True if a configuration is that of the closed forms at its pose: all legs have the same directions. Rods
+    may be turned about themselves."""
+    placer, question = mover.setup.placer, mover.setup.all_samples.observation_model
     if placer is None:
         return False
     (found,) = placer.configurations(at.pose(mover.setup.motion.link)[None])
-    return found is not None and float(np.linalg.norm(at.model.difference(found.q, at.q))) < RELATION_ANGLE_TOL
+    if found is None:
+        return False
+    apart, _ = question.target(found).error_and_jacobian(at.model, at.q)
+    return float(np.linalg.norm(apart)) < RELATION_ANGLE_TOL
 
 
 def build_plane_grid(

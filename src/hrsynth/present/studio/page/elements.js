@@ -51,22 +51,50 @@ function tick(words, checked, onchange) {
 /* A number in the unit that people read: degrees for radians. */
 function written(value, unit) {
   if (value === null || value === undefined) return "";
-  const words = unit === "rad" ? `${(value * 180 / Math.PI).toFixed(1)}°` : `${value.toFixed(4)} ${unit}`;
+  const words = unit === "rad" ? `${(value * 180 / Math.PI).toFixed(1)}°` : `${value.toFixed(4)}\u00a0${unit}`;
   return words.replace(/^-(?=0\.0+[^0-9])/, "");
 }
 
-/* A slider with its label and what it stands at, one of `values` if there are any; `read` sets it without a call of `onmove`. */
+/* The number that a text gives, as `written` writes it; NaN for any other text. */
+function parsed(text, unit) {
+  const number = text.trim().replace("−", "-").replace(unit === "rad" ? /\s*(°|deg)$/ : /\s*m$/, "");
+  return number === "" ? NaN : Number(number) * (unit === "rad" ? Math.PI / 180 : 1);
+}
+
+/* A slider with its label and its value, one of `values` if there are any; any other value with a unit can be typed.
+   `read` sets it without a call of `onmove`. */
 class Slider {
   constructor({ label, unit, min, max, value, steps = 200, values }, onmove, onset = () => {}) {
-    Object.assign(this, { unit, values });
-    const id = fresh("slider");
+    Object.assign(this, { label, unit, min, max, values });
+    const id = fresh("slider"), typed = unit && !values;
     this.input = element("input", { type: "range", id });
     Object.assign(this.input, values ? { max: values.length - 1 } : { min, max, step: unit ? (max - min) / steps || 1e-6 : 1 });
-    this.output = element("output", { for: id });
-    this.root = element("div", { className: "slider" }, element("label", { for: id, textContent: label }), this.output, this.input);
+    this.output = typed ? element("input", { type: "text", className: "typed", "aria-label": `${label}: value`, autocomplete: "off", spellcheck: false, size: 9 })
+      : element("output", { for: id });
+    this.wrong = typed ? element("p", { role: "alert", className: "wrong", id: fresh("wrong") }) : null;
+    this.root = element("div", { className: "slider" }, element("label", { for: id, textContent: label }), this.output, this.input, this.wrong);
     this.input.oninput = () => { const at = Number(this.input.value); this.told(values ? values[at] : at); onmove(this.value); };
     this.input.onchange = () => onset(this.value);
+    this.output.oninput = () => { this.typing = true; };
+    this.output.onchange = () => { if (this.take()) { onmove(this.value); onset(this.value); } };
     this.read(value);
+  }
+
+  /* Take the typed number, an end of the range where it is written like that; in one line why not. */
+  take() {
+    const { label, unit, min, max, output } = this, text = output.value.trim(), value = parsed(text, unit);
+    const inside = [min, max].find((end) => written(value, unit) === written(end, unit)) ?? (value >= min && value <= max ? value : NaN);
+    if (Number.isNaN(inside)) this.fail(`${label}: got ${text || "nothing"}, expected a number from ${written(min, unit)} to ${written(max, unit)}`);
+    else { this.typing = false; this.read(inside); }
+    return !Number.isNaN(inside);
+  }
+
+  /* One line below it. */
+  fail(words) {
+    if (!this.wrong) return;
+    this.wrong.textContent = words;
+    this.output.setAttribute("aria-invalid", Boolean(words));
+    this.output.setAttribute("aria-describedby", this.wrong.id);
   }
 
   read(value) {
@@ -74,26 +102,28 @@ class Slider {
     this.told(value);
   }
 
-  /* The value itself: what was read may lie between the steps of the input. */
+  /* The value itself: what was read may lie between the steps of the input. A text that is being typed stays. */
   told(value) {
     this.value = value;
     const words = this.unit ? written(value, this.unit) : String(value);
-    this.output.textContent = words;
     this.input.setAttribute("aria-valuetext", words);
+    if (this.typing && document.activeElement === this.output) return;
+    this.typing = false;
+    this.output.value = words;
+    this.fail("");
   }
 }
 
-/* The command and the Python line that give the same, each with a button that copies it. */
+/* Texts by their keys and names, each with a button that copies it: the command and the Python line that give the same. */
 class Same {
-  constructor() {
-    this.root = element("details", { className: "same", hidden: true }, element("summary", { textContent: "Command and Python line" }));
-    this.rows = ["command", "python"].map((key) => this.row(key));
+  constructor(title = "Command and Python line", rows = [["command", "command"], ["python", "Python line"]]) {
+    this.root = element("details", { className: "same", hidden: true }, element("summary", { textContent: title }));
+    this.rows = rows.map(([key, name]) => this.row(key, name));
   }
 
-  row(key) {
+  row(key, name) {
     const code = element("code"), copied = element("span", { className: "copied", role: "status" });
-    const words = key === "command" ? "Copy the command" : "Copy the Python line";
-    const copy = button("Copy", () => this.copy(code, copied), { "aria-label": words });
+    const copy = button("Copy", () => this.copy(code, copied), { "aria-label": `Copy the ${name}` });
     const root = element("div", { className: "line" }, code, copy, copied);
     this.root.append(root);
     return { key, code, root };

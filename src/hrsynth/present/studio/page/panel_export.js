@@ -11,13 +11,25 @@ class ExportPanel extends Panel {
     this.body.append(element("ul", { className: "offers" },
       this.offer("Image", "the present 3D view (PNG)", () => this.picture()),
       ...offers.map(([kind, name, words]) => this.offer(name, words, () => this.fetch(kind, name)))));
+    this.link = new Same("Link to this robot with its legs and pose", [["link", "link"]]);
+    this.body.append(this.link.root);
   }
+
+  /* The link leads to the panel before this one. */
+  entered() { if (this.studio.scene) this.link.show({ link: Bookmark.of(this.studio, this.studio.tabs.before ?? "move") }); }
+
+  settled() { this.entered(); }
+
+  rewatched() { this.entered(); }
 
   offer(name, words, onclick) {
     return element("li", { className: "row" }, button(name, onclick, { "aria-label": `Save: ${name}` }), element("span", { textContent: words }));
   }
 
-  opened(scene) { this.same.show(scene); }
+  opened(scene) {
+    this.same.show(scene);
+    this.entered();
+  }
 
   async picture() {
     const blob = await this.studio.stage.picture();

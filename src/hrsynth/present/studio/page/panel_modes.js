@@ -11,7 +11,7 @@ class ModesPanel extends Panel {
     this.back = button("Back to the previous pose", () => this.return(), { hidden: true });
     this.join = button("Group by aspect", () => this.group(), { hidden: true });
     this.aspects = element("div", { "aria-live": "polite" });
-    this.body.append(element("p", { textContent: "Poses with the same observed directions: the loop may stop at any of them." }),
+    this.body.append(element("p", { textContent: "Poses with the same observed directions: the loop may stop at any of them. In the camera image their legs lie elsewhere: only the directions are the same." }),
       element("div", { className: "row" }, this.find, this.drawn, this.back), this.words, this.list, this.join, this.aspects);
     this.outlines = [];
   }

@@ -10,20 +10,28 @@ class RobotPanel extends Panel {
     this.gallery = element("ul", { className: "gallery", "aria-label": "Shipped robots" });
     this.mine = new Map();
     const input = element("input", { type: "file", multiple: true, id: fresh("file") });
-    input.onchange = () => { this.take([...input.files]); input.value = ""; };
+    input.onchange = () => { this.drop.after(this.status.root); this.take([...input.files]); input.value = ""; };
     this.drop = element("div", { className: "drop" },
       element("label", { for: input.id, textContent: "Drop a robot file here, with its meshes if it has any, or choose one" }), input);
-    this.body.append(this.drop, this.files, this.guesses, this.notes, element("h3", { textContent: "Shipped robots" }), this.gallery);
+    const link = element("input", { type: "text", id: fresh("link"), autocomplete: "off", placeholder: "#robot=…" });
+    link.onchange = () => { if (link.value) this.studio.restore(Bookmark.read(link.value) ?? { source: link.value }); };
+    this.sent = element("div", { className: "field" }, element("label", { for: link.id, textContent: "Open a link" }), link);
+    this.body.append(this.drop, this.status.root, this.files, this.sent, this.guesses, this.notes, element("h3", { textContent: "Shipped robots" }), this.gallery);
     for (const [name, over] of [["dragover", true], ["dragleave", false], ["drop", false]])
       document.addEventListener(name, (event) => this.dragged(event, over));
   }
 
-  /* A file may be dropped anywhere on the page. */
+  /* A file may be dropped anywhere on the page; what becomes of it is shown there: in the 3D view, or below the place for files. */
   dragged(event, over) {
     if (![...(event.dataTransfer?.types || [])].includes("Files")) return;
     event.preventDefault();
     this.drop.classList.toggle("over", over && event.relatedTarget !== null);
-    if (event.type === "drop") { this.studio.show("robot"); this.take([...event.dataTransfer.files]); }
+    if (event.type !== "drop") return;
+    this.studio.show("robot");
+    if ($("sight").contains(event.target)) $("sight").append(this.status.root);
+    else this.drop.after(this.status.root);
+    this.drop.scrollIntoView({ block: "nearest" });
+    this.take([...event.dataTransfer.files]);
   }
 
   /* The gallery, and the files of the folder. */

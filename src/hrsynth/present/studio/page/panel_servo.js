@@ -6,7 +6,7 @@ class ServoPanel extends Panel {
     super(studio, "servo", "Servo");
     this.ends = { start: null, goal: null };
     this.places = element("div", { className: "ends" });
-    this.run = button("Run", () => this.go(), { className: "main" });
+    this.run = button("Run", () => this.go(), { className: "main", disabled: true });
     this.player = new Player((frame, index) => this.frame(frame, index), { reduced: studio.reduced });
     this.picture = new CameraPicture();
     this.words = element("p", { "aria-live": "polite" });
@@ -37,7 +37,7 @@ class ServoPanel extends Panel {
 
   end(key) {
     const kept = this.ends[key], sliders = this.studio.scene.sliders;
-    const said = kept ? sliders.map(({ label, unit }, i) => `${label} ${written(kept.values[i], unit)}`).join(", ") : key === "start" ? "zero configuration" : "not set";
+    const said = kept ? sliders.map(({ label, unit }, i) => `${label}\u00a0${written(kept.values[i], unit)}`).join(", ") : key === "start" ? "zero configuration" : "not set";
     const root = element("div", { className: "row" }, element("span", { textContent: `${key === "start" ? "Start" : "Goal"}: ${said}` }),
       button("Set here", () => this.set(key), { "aria-label": `Set here: the ${key}` }));
     if (kept) root.append(button("Go there", () => this.studio.fly(null, kept.here), { "aria-label": `Go there: the ${key}` }));
@@ -79,7 +79,11 @@ class ServoPanel extends Panel {
 
   entered() { this.studio.stage.goal(this.ends.goal?.state ?? null); this.studio.relegend(); }
 
-  left() { this.stop(); this.studio.stage.goal(null); }
+  left() {
+    this.stop();
+    this.studio.stage.goal(null);
+    this.studio.relegend();
+  }
 }
 ServoPanel.SECONDS = 5;
 

@@ -66,6 +66,18 @@ return class Sight {
     this.camera.setViewOffset(width, height, 0, this.shift, width, height);
   }
 
+  /* Make the labels of a scene at least so many pixels high, however small it is drawn. */
+  enlarge(scene, least) {
+    const { camera, size: [, height] } = this, place = new THREE.Vector3();
+    camera.updateMatrixWorld();
+    scene.traverseVisible((mesh) => {
+      if (!mesh.isSprite) return;
+      const own = (mesh.userData.size ??= mesh.scale.clone());
+      const away = -mesh.getWorldPosition(place).applyMatrix4(camera.matrixWorldInverse).z;
+      mesh.scale.copy(own).multiplyScalar(Math.max(1, 2 * least * away * Math.tan(HALF) / (height * own.y)));
+    });
+  }
+
   /* The ray from the camera through a point of the page. */
   ray(x, y) {
     const box = this.canvas.getBoundingClientRect(), ray = new THREE.Raycaster();
@@ -99,7 +111,7 @@ return class Sight {
       object.updateWorldMatrix(true, true);
       object.traverseVisible((mesh) => {
         if (mesh.isSprite) {
-          const middle = new THREE.Vector3().setFromMatrixPosition(mesh.matrixWorld), half = 0.5 * mesh.scale.x;
+          const middle = new THREE.Vector3().setFromMatrixPosition(mesh.matrixWorld), half = 0.5 * (mesh.userData.size ?? mesh.scale).x;
           [0, 1, 2].forEach((i) => [-half, half].forEach((by) => found.push(middle.clone().setComponent(i, middle.getComponent(i) + by))));
         }
         if (!mesh.isMesh || mesh.userData.free) return;

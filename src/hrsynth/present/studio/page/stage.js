@@ -6,7 +6,7 @@ const Stage = (() => {
 const { clear, label, turn, vector } = Solids;
 const { Machine, Direction, outline } = Robots;
 const { LostArrows, Plane, ellipsoid, sights } = Overlays;
-const CLICK = 6, NEAR = { mouse: 7, pen: 10, touch: 18 }, ASK_EACH = 120, SAME = 1e-3;  /* px, px, ms, rad or characteristic lengths */
+const READABLE = 22, CLICK = 6, NEAR = { mouse: 7, pen: 10, touch: 18 }, ASK_EACH = 120, SAME = 1e-3;  /* px, px, px, ms, rad or characteristic lengths */
 const NO_WEBGL = "The 3D view needs WebGL 2, which this browser does not provide: all text and numbers are still available.";
 const LOST = "The graphics context was lost; the 3D view returns with it.";
 
@@ -164,7 +164,7 @@ return class Stage {
   /* Other assembly modes as outlines, without the one where the robot is; a click on one is told as its label. */
   ghosts(modes) {
     clear(this.parts.ghosts);
-    const { real } = this.machines, size = 0.17 * this.record.length;
+    const { real } = this.machines, size = 0.17 * this.record?.length;
     for (const { label: name, places, reachable } of modes) {
       const group = outline(real.record, places, Colours.of("mode"),
         { name, size, opacity: reachable === false ? 0.16 : 0.3, pick: { kind: "mode", name } });
@@ -314,6 +314,7 @@ return class Stage {
       this.arrowsOfLost.swing(time / 1000);
       if (!ground) this.dirty();
     }
+    this.sight.enlarge(this.world, READABLE);
     this.world.background = ground && new THREE.Color(ground);
     this.renderer.render(this.world, this.sight.camera);
     this.drawn = (this.drawn ?? 0) + 1;

@@ -11,6 +11,9 @@ class Studio {
     const kept = $("kept"), to = { onstart: (said) => this.begin(said), onback: () => this.back(), onlost: (refused) => this.lost(refused) };
     this.link = kept ? new Kept(JSON.parse(kept.textContent), to) : new Link(to);
     this.pending = 0;
+    this.opening = 1;  /* robots that are being read, and the connection */
+    this.early = new Set();
+    document.addEventListener("click", (event) => this.defer(event), true);
     this.tools();
     $("legend").open = !matchMedia("(max-width: 760px)").matches;
     document.addEventListener("keydown", (event) => { if (event.key === "Escape") this.stop(); });
@@ -21,12 +24,79 @@ class Studio {
     const made = kinds.map((Kind) => new Kind(this));
     this.panels = Object.fromEntries(made.map((panel) => [panel.key, panel]));
     document.body.classList.toggle("plain", !panels);
-    if (panels) this.tabs = new Tabs($("panels"), made, (key, before) => { this.panels[before]?.left(); this.panels[key].entered(); });
+    if (panels) this.tabs = new Tabs($("panels"), made, (key, before) => { this.panels[before]?.left(); this.panels[key].entered(); this.keep(); });
     else $("panels").append(...made.map(({ root }) => root));
     this.show(start ? "move" : "robot");
     this.panels.robot?.fill();
-    if (start) this.open(start, { watch, camera, hidden });
+    const wanted = this.tabs && Bookmark.read(location.hash);
+    if (this.tabs) addEventListener("hashchange", () => this.restore(Bookmark.read(location.hash)));
+    if (wanted) this.restore(wanted, () => start && this.open(start, { watch, camera, hidden }));
+    else if (start) this.open(start, { watch, camera, hidden });
     else { this.kept(); this.ready(); }
+    this.act();
+  }
+
+  /* Open what a link holds; `otherwise` where its robot is not opened. */
+  async restore(wanted, otherwise = () => {}) {
+    if (!wanted) return;
+    const { source, options, panel, ...more } = wanted, { scene: before, panels, tabs: { chosen } } = this, { status } = panels.robot;
+    await this.open({ source, options }, { ...more, link: true });
+    const words = this.scene === before ? status.wrong.textContent : panel && !(panel in panels) ? `panel: got ${panel}, expected ${Object.keys(panels).join(", ")}` : "";
+    if (this.scene === before) {
+      status.clear();
+      await otherwise();
+    }
+    this.show(panel in panels ? panel : this.scene ? chosen : "robot");
+    if (words) this.notice(words);
+    this.keep();
+  }
+
+  /* Request the scene of a robot; of a link without what is refused: its pose, its legs and camera, or both. */
+  async request(asked, link) {
+    const bare = { watch: null, camera: null };
+    let refused = null;
+    for (const less of link ? [{}, { here: null }, bare, { ...bare, here: null }] : [{}]) {
+      const fields = { ...asked, ...less };
+      const scene = await this.link.ask("open", fields).catch((error) => ({ failed: error.message, error }));
+      if (scene?.failed) { refused ??= scene; continue; }
+      this.notice(refused?.failed);
+      return scene && { ...scene, asked: fields };
+    }
+    if (refused.error) throw refused.error;
+    return refused;
+  }
+
+  /* One line on what is wrong with a link. */
+  notice(words) {
+    $("lost-link").hidden = !words;
+    $("lost-link").textContent = words ? `The link is not restored as a whole. ${words}` : "";
+  }
+
+  /* The address holds what is shown. */
+  keep() {
+    if (this.tabs && this.scene) history.replaceState(null, "", Bookmark.of(this));
+  }
+
+  /* A click on what needs a robot waits while one is being read. */
+  defer(event) {
+    const what = event.target.closest(":is(#tools, .panel:not(.panel-robot) .body) :is(button, [type=checkbox], [type=radio])");
+    const panel = Object.values(this.panels ?? {}).find(({ root }) => root.contains(what));
+    if (!what || (!this.opening && (this.scene || !panel))) return;
+    event.preventDefault();
+    event.stopPropagation();
+    if (!this.opening) return void panel.status.fail("No robot is open. Choose one in the panel Robot.");
+    this.early.add(what);
+    panel?.status.say("This starts once the robot is read.");
+  }
+
+  /* One robot less is being read: after the last one, what was clicked before acts. */
+  act() {
+    this.opening -= 1;
+    if (this.opening) return;
+    const clicked = [...this.early];
+    this.early.clear();
+    for (const panel of Object.values(this.panels)) if (clicked.some((what) => panel.root.contains(what))) panel.status.clear();
+    for (const what of clicked) if (what.isConnected && !what.closest("[hidden]:not(.panel)")) what.click();
   }
 
   ready() { requestAnimationFrame(() => { document.body.dataset.ready = "yes"; }); }
@@ -62,15 +132,24 @@ class Studio {
   }
 
   /* Another robot; the one that is shown stays until the new one is read. */
-  async open(robot, { watch = null, camera = null, hidden = false } = {}) {
+  async open(robot, wanted = {}) {
+    this.opening += 1;
+    await this.read(robot, wanted);
+    this.act();
+  }
+
+  async read(robot, { watch = null, camera = null, here = null, hidden = false, link = false }) {
     const given = { source: robot.source, options: robot.options || {} };
     const { status } = this.panels.robot || this.panels.move;
-    const scene = await status.during(this.link.ask("open", { robot: given, watch, camera, here: null }), "Reading the robot", () => this.link.cancel("open"));
+    const scene = await status.during(this.request({ robot: given, watch, camera, here }, link), "Reading the robot", () => this.link.cancel("open"));
     this.ready();
     if (!scene || scene.failed) { this.kept(); this.panels.robot?.failed(scene, given); return; }
-    Object.assign(this, { robot: given, camera, scene, named: watch, here: scene.here ?? null });
+    const { asked } = scene;
+    Object.assign(this, { robot: given, camera: asked.camera, scene, named: asked.watch, here: scene.here ?? null });
+    this.zero = asked.here ? null : String(scene.here?.q);
     this.watch = scene.legs.filter(({ watched }) => watched).map(({ name }) => name);
     this.values = scene.values ?? scene.sliders.map(({ home }) => home);
+    this.motors = scene.motors;
     this.settled = String(this.values);
     clearTimeout(this.rest);
     $("name").textContent = scene.name;
@@ -84,6 +163,7 @@ class Studio {
     this.stage.fit();
     this.relegend();
     this.say(`${scene.name} is open: ${scene.words}.`);
+    this.keep();
     this.answer();
     this.link.ask("move", this.asked(), "first").catch(() => {});  /* the process that moves it reads the robot now */
     if (hidden) this.reveal();
@@ -130,7 +210,7 @@ class Studio {
     this.moving = true;
     const ask = () => ({ ...this.asked(), hidden: this.sees, ...fields });
     const robot = this.robot;
-    const answer = await this.link.ask("move", ask).catch((error) => { this.panels.move.status.fail(error.message); return null; });
+    const answer = await this.link.ask("move", ask).catch((error) => { this.panels.move.refused(error.message); return null; });
     this.pending -= 1;
     this.moving = this.pending > 0;
     if (!answer || robot !== this.robot) return;
@@ -138,15 +218,17 @@ class Studio {
   }
 
   arrive(answer) {
-    Object.assign(this, { here: answer.here, values: answer.values, state: answer.state });
+    Object.assign(this, { here: answer.here, values: answer.values, motors: answer.motors, state: answer.state });
     this.draw(answer.state);
     this.each("moved", answer);
     clearTimeout(this.rest);
-    if (!this.moving && String(this.values) !== this.settled) this.rest = setTimeout(() => this.settle(), Studio.REST);
+    if (!this.moving) this.rest = setTimeout(() => this.settle(), Studio.REST);
   }
 
   /* Settled at another pose: results that depend on it are requested anew. */
   settle() {
+    this.keep();
+    if (String(this.values) === this.settled) return;
     this.settled = String(this.values);
     this.each("settled");
   }
@@ -175,6 +257,7 @@ class Studio {
     Object.assign(this, { watch: names, named: null });
     this.stage.watch(names);
     this.judge(null);
+    this.keep();
     this.each("rewatched", names);
   }
 

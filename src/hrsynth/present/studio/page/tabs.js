@@ -25,7 +25,7 @@ class Tabs {
       this.tabs[i].tabIndex = chosen ? 0 : -1;
       panel.root.hidden = !chosen;
     });
-    if (key !== this.chosen) { const before = this.chosen; this.chosen = key; this.onchosen(key, before); }
+    if (key !== this.chosen) { this.before = this.chosen; this.chosen = key; this.onchosen(key, this.before); }
   }
 
   pressed(event) {
