@@ -193,7 +193,7 @@ def describe_loops(robot: Mechanism) -> str:
         if kind in "RCPE":
             across = build_plane_axes(joint.axis)
             pairs += [(1, each, joint.axis) for each in across]
-            pairs += [(2, each, each) for each in {"C": across, "P": across, "E": (joint.axis,)}.get(kind, ())]
+            pairs += [(2, each, each) for each in ([] if kind == "R" else [joint.axis] if kind == "E" else across)]
             pairs += [(1, *across)] * (kind == "P")
         if kind == "F":
             pairs += [(1, E[k - 1], E[k]) for k in range(3)]

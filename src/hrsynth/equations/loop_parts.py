@@ -16,7 +16,8 @@ from ..geometry.vectors import Array, times
 from ..results import Value
 from ..solving.newton import ApproachedZeros, approach_zeros
 from ..tolerances import CLOSURE_SOLVER_TOL, NAMED_TWIST_TOL, RANK_CUTOFF_FRACTION
-from .joint_equations import CouplingEquation, JointLoop, LoopRow, LoopSystem, evaluate_residuals
+from .carried_vectors import SweptChains, Total, add_slope, list_row_products
+from .joint_equations import CouplingEquation, JointLoop, LoopRow, LoopSystem, Swept, evaluate_residuals
 
 DISTANCE = LoopRow("distance")
 LOOP_PART_NEWTON_STEPS_MAX = 30
@@ -188,11 +189,12 @@ def evaluate_equations(
                 values[k] = values[k] + system.coordinates[i].from_zero(forms[i]) * rate
         else:
             groups.setdefault(id(each.of), []).append(k)
+    known: dict[tuple[int, ...], Swept] = {}
     for members in groups.values():
         loop = equations[members[0]].of
         rows = [row for row in (equations[k].row for k in members) if row is not None]
         assert isinstance(loop, JointLoop)
-        found = evaluate_residuals(system, loop, forms, rows)
+        found = evaluate_residuals(system, loop, forms, rows, known)
         for k, value, slope in zip(members, *found, strict=True):
             values[k], slopes[k] = value, slope
     return values, slopes
@@ -209,10 +211,19 @@ def derive_equations(
     """Equations (…, m) and their derivatives by all coordinates (…, m, N), at values of a ``shape``, None for those at
     zero."""
     errors, rates = np.zeros((*shape, len(equations))), np.zeros((*shape, len(equations), len(values)))
-    for k, (value, slope) in enumerate(zip(*evaluate_equations(system, equations, values), strict=True)):
-        errors[..., k] = value
-        for i, rate in slope.items():
-            rates[..., k, i] = rate
+    carrier = SweptChains(system, values, np.arange(len(values)))
+    for k, each in enumerate(equations):
+        if each.row is None or isinstance(each.of, CouplingEquation):
+            value, slope = (item[0] for item in evaluate_equations(system, [each], values))
+            errors[..., k] = value
+            for i, rate in slope.items():
+                rates[..., k, i] = rate
+            continue
+        total = Total(errors[..., k], (len(values),))
+        for product, weight in list_row_products(carrier, each.of, each.row):
+            errors[..., k] += weight * product.value
+            add_slope(total, product, weight)
+        rates[..., k, :] = total.sum
     return errors, rates
 
 
