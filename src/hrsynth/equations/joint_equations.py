@@ -368,9 +368,7 @@ def evaluate_residuals(
     return found, slopes
 
 
-def _sweep_once(
-    system: LoopSystem, chain: tuple[int, ...], values: Any, known: dict[tuple[int, ...], Swept]
-) -> Swept:
+def _sweep_once(system: LoopSystem, chain: tuple[int, ...], values: Any, known: dict[tuple[int, ...], Swept]) -> Swept:
     """Return a chain at some values, evaluated if it is not known."""
     if chain not in known:
         known[chain] = system.displacement(chain, values)

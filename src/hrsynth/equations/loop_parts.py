@@ -210,21 +210,35 @@ def derive_equations(
 ) -> tuple[Array, Array]:
     """Equations (…, m) and their derivatives by all coordinates (…, m, N), at values of a ``shape``, None for those at
     zero."""
-    errors, rates = np.zeros((*shape, len(equations))), np.zeros((*shape, len(equations), len(values)))
-    carrier = SweptChains(system, values, np.arange(len(values)))
-    for k, each in enumerate(equations):
-        if each.row is None or isinstance(each.of, CouplingEquation):
-            value, slope = (item[0] for item in evaluate_equations(system, [each], values))
-            errors[..., k] = value
-            for i, rate in slope.items():
-                rates[..., k, i] = rate
-            continue
-        total = Total(errors[..., k], (len(values),))
-        for product, weight in list_row_products(carrier, each.of, each.row):
-            errors[..., k] += weight * product.value
-            add_slope(total, product, weight)
-        rates[..., k, :] = total.sum
-    return errors, rates
+    if not equations:
+        return np.zeros((*shape, 0)), np.zeros((*shape, 0, len(values)))
+    errors, rates = differentiate_equations(system, equations, values, np.zeros(shape), range(len(values)))
+    return np.stack(errors, axis=-1), np.stack(rates, axis=-2)
+
+
+def differentiate_equations(
+    system: LoopSystem, equations: Sequence[LoopEquation], values: Any, zero: Any, places: Sequence[int]
+) -> tuple[list[Any], list[Any]]:
+    """As :func:`evaluate_equations`, with derivatives (…, m) by the coordinates ``places`` (m,), the only
+    ones that count, at floats or forms of the shape of ``zero``; each vector and its derivatives are evaluated once."""
+    values = [each if i in places else None for i, each in enumerate(values)]
+    order = np.zeros(len(values), dtype=np.intp)
+    order[list(places)] = np.arange(len(places))
+    carrier, found, slopes = SweptChains(system, values, order), list[Any](), list[Any]()
+    for each in equations:
+        value, slope = zero, Total(zero, (len(places),))
+        if isinstance(each.of, CouplingEquation):
+            for i, rate in each.of.slope.items():
+                if values[i] is not None:
+                    value = value + system.coordinates[i].from_zero(values[i]) * rate
+                    slope.add(([order[i]],), rate)
+        elif each.row is not None:
+            for product, weight in list_row_products(carrier, each.of, each.row):
+                value = value + product.value * weight
+                add_slope(slope, product, weight)
+        found.append(value)
+        slopes.append(slope.sum)
+    return found, slopes
 
 
 def evaluate_all_equations(
