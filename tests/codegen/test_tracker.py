@@ -35,11 +35,11 @@ from hrsynth.codegen.trace import TracedFunction
 from hrsynth.codegen.tracker import Tracker
 from hrsynth.equations.loop_parts import split_loop_system
 from hrsynth.equations.tape import Tape
-from hrsynth.geometry.vectors import Array
+from hrsynth.geometry.vectors import Array, build_plane_axes
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.kinematics.tasks import solve
 from hrsynth.mechanism import Mechanism
-from hrsynth.mechanism.model import Limits
+from hrsynth.mechanism.model import JointType, Limits
 from strategies import planar, random_rotation, transformed
 
 STEPS = int(os.environ.get("HRSYNTH_STEPS", "3000"))
@@ -86,25 +86,11 @@ int main() {
 }
 """
 )
-FOLLOW = (
+FOLLOW = Path(__file__).parent / "follow.cpp"
+STEP = (
     HEAD
     + """
-// x along a line of motors in many pieces: Newton's method from one to the next, with steps that stay short.
-bool followed(const double* from, const double* to, double* x, int pieces, int deeper) {
-  double here[MOTORS], next[MOTORS];
-  std::copy(from, from + MOTORS, here);
-  for (int k = 1; k <= pieces; ++k) {
-    for (int m = 0; m < MOTORS; ++m) next[m] = from[m] + (to[m] - from[m]) * k / pieces;
-    double y[detail::UNKNOWNS];
-    std::copy(x, x + detail::UNKNOWNS, y);
-    bool good = CLOSE(next, y);
-    for (int i = 0; i < detail::UNKNOWNS; ++i) good = good && std::abs(y[i] - x[i]) < 0.01;
-    if (good) std::copy(y, y + detail::UNKNOWNS, x);
-    else if (!deeper || !followed(here, next, x, 100, deeper - 1)) return false;
-    std::copy(next, next + MOTORS, here);
-  }
-  return true;
-}
+// Random steps: those that are proved are written, for `follow.cpp`, what became of all is printed.
 int main(int, char**) {
   int tries = 0, seed = 0, told = 0;
   double reach = 0.0, size = 0.0;
@@ -113,18 +99,19 @@ int main(int, char**) {
   std::uniform_real_distribution<> uniform(-1.0, 1.0);
   Branch home, branch;
   if (home.start() != Status::ok) return 3;
+  FILE *const steps = std::fopen("steps", "wb"), *const jumps = std::fopen("jumps", "wb");
   Motors zero;
   for (int k = 0; k < MOTORS; ++k) zero[k] = detail::ZERO_Q[k] * detail::UNIT_Q[k];
   Motors at = zero;
-  int counts[7] = {}, wrong = 0, unsure = 0, jumped = 0;
+  int counts[7] = {}, jumped = 0;
   for (int i = 0; i < tries; ++i) {
     if (i % 10 == 0) {
       branch = home;
       at = zero;
       Motors goal;
       for (int k = 0; k < MOTORS; ++k) goal[k] = reach * uniform(random) * detail::UNIT_Q[k];
-      for (int k = 1; k <= 100; ++k) {
-        const Motors next = zero + goal * (k / 100.0);
+      for (int k = 1; k <= 25; ++k) {
+        const Motors next = zero + goal * (k / 25.0);
         const Status status = branch.to(next);
         if (status > Status::limit) break;
         at = next;
@@ -136,10 +123,7 @@ int main(int, char**) {
     Branch moved = branch;
     const Status status = moved.to(at + step);
     ++counts[int(status)];
-    double q[MOTORS], goal[MOTORS], end[detail::UNKNOWNS];
     const Solution start = branch.at(), found = moved.at();
-    for (int k = 0; k < MOTORS; ++k) q[k] = at[k] / detail::UNIT_Q[k], goal[k] = (at[k] + step[k]) / detail::UNIT_Q[k];
-    for (int j = 0; j < detail::UNKNOWNS; ++j) end[j] = start.passive[j] / detail::UNIT_X[j];
     if (status > Status::line) {
       if (found.passive != start.passive) return 4;
       continue;
@@ -149,41 +133,77 @@ int main(int, char**) {
       print(at); print(after); print(found.position); print(found.rotation);
       std::printf("\\n");
     }
-    // a plain solution from the same start may lie elsewhere: what is proved is worth something
-    double plain[detail::UNKNOWNS];
-    std::copy(end, end + detail::UNKNOWNS, plain);
-    (void)CLOSE(goal, plain);
     // the line; of a box two ways along its edges as well
-    for (int way = 0; way < (status == Status::ok ? 3 : 1); ++way) {
-      double x[detail::UNKNOWNS], here[MOTORS];
-      std::copy(end, end + detail::UNKNOWNS, x);
-      std::copy(q, q + MOTORS, here);
-      bool good = true;
-      if (way == 0) good = followed(q, goal, x, 500, 2);
-      for (int m = 0; m < MOTORS && way > 0 && good; ++m) {
-        const int k = way == 1 ? m : MOTORS - 1 - m;
-        double next[MOTORS];
-        std::copy(here, here + MOTORS, next);
-        next[k] = goal[k];
-        good = followed(here, next, x, 500, 2);
-        here[k] = goal[k];
-      }
-      double off = 0.0;
-      for (int j = 0; j < detail::UNKNOWNS; ++j)
-        off = std::max(off, std::abs(x[j] - found.passive[j] / detail::UNIT_X[j]));
-      if (!good) ++unsure;
-      else if (!(off < 1e-9)) ++wrong;
+    double record[1 + 2 * MOTORS + 2 * detail::UNKNOWNS] = {status == Status::ok ? 3.0 : 1.0};
+    double *q = record + 1, *goal = q + MOTORS, *from = goal + MOTORS, *end = from + detail::UNKNOWNS;
+    double plain[detail::UNKNOWNS];
+    for (int k = 0; k < MOTORS; ++k) q[k] = at[k] / detail::UNIT_Q[k], goal[k] = (at[k] + step[k]) / detail::UNIT_Q[k];
+    for (int j = 0; j < detail::UNKNOWNS; ++j) {
+      plain[j] = from[j] = start.passive[j] / detail::UNIT_X[j];
+      end[j] = found.passive[j] / detail::UNIT_X[j];
     }
+    std::fwrite(record, sizeof record, 1, steps);
+    // a plain solution from the same start may lie elsewhere: what is proved is worth something
+    (void)CLOSE(goal, plain);
     double off = 0.0;
-    for (int j = 0; j < detail::UNKNOWNS; ++j)
-      off = std::max(off, std::abs(plain[j] - found.passive[j] / detail::UNIT_X[j]));
-    jumped += !(off < 1e-6);
+    for (int j = 0; j < detail::UNKNOWNS; ++j) off = std::max(off, std::abs(plain[j] - end[j]));
+    if (off < 1e-6) continue;
+    ++jumped;
+    std::copy(plain, plain + detail::UNKNOWNS, end);
+    record[0] = 1.0;
+    std::fwrite(record, sizeof record, 1, jumps);
   }
-  std::printf("%d %d %d %d %d ", counts[0], counts[1], counts[3], counts[4], counts[5]);
-  std::printf("%d %d %d\\n", wrong, unsure, jumped);
+  std::fclose(steps), std::fclose(jumps);
+  std::printf("%d %d %d %d %d %d\\n", counts[0], counts[1], counts[3], counts[4], counts[5], jumped);
 }
 """
 )
+
+
+def describe_loops(robot: Mechanism) -> str:
+    """The transforms of a robot's joints, and the relations of those that its tree leaves out, for ``follow.cpp``; of
+    the branch only the names of its coordinates, and which of them are constant."""
+    proof, E = export(robot).proof, np.eye(3)
+    tree, length, joints = proof.system.coordinates, proof.system.length, proof.robot.joints
+    numbers = {name: k for k, name in enumerate((*proof.motors, *proof.passive))}
+    kept = [i for i, each in enumerate(tree) if each.name in numbers]
+
+    def find_body(i: int) -> int:
+        while i >= 0 and i not in kept:
+            i = tree[i].parent
+        return kept.index(i) if i >= 0 else -1
+
+    rows: list[list[Any]] = [[len(proof.motors), len(proof.passive), len(kept)]]
+    for i in kept:
+        joint = joints.get(tree[i].joint)
+        point = tree[i].point if joint is None else joint.point / length
+        rows.append(
+            [numbers[tree[i].name], int(tree[i].slides), find_body(tree[i].parent), tree[i].zero, *tree[i].axis, *point]
+        )
+    relations: list[list[Any]] = []
+    moved = {each.joint for each in tree}
+    for joint in (each for each in joints.values() if each.name not in moved and each.type is not JointType.FREE):
+        ends = [find_body(proof.system.body[link]) for link in joint.links]
+        kind, axes = joint.type.value, joint.axes
+        pairs: list[tuple[int, Array, Array]] = []
+        if kind in "RSUF":
+            pairs.append((0, E[0], E[0]))
+        if kind == "U":
+            pairs.append((1, axes[0], axes[1]))
+        if kind in "RCPE":
+            across = build_plane_axes(joint.axis)
+            pairs += [(1, each, joint.axis) for each in across]
+            pairs += [(2, each, each) for each in ([] if kind == "R" else [joint.axis] if kind == "E" else across)]
+            pairs += [(1, *across)] * (kind == "P")
+        if kind == "F":
+            pairs += [(1, E[k - 1], E[k]) for k in range(3)]
+        relations += [[number, *ends, *u, *v, *(joint.point / length)] for number, u, v in pairs]
+    for coupling in proof.robot.couplings:
+        both = coupling.driver, coupling.driven
+        pair = [kept.index(next(i for i, each in enumerate(tree) if each.joint == name)) for name in both]
+        units = [length if tree[kept[k]].slides else 1.0 for k in pair]
+        relations.append([3, *pair, coupling.ratio * units[0] / units[1], *[0.0] * 8])
+    return "\n".join(" ".join(repr(float(x)) for x in row) for row in (*rows, [len(relations)], *relations))
 
 
 def exactly(function: TracedFunction, q: Any, x: Any) -> dict[str, dict[tuple[int, ...], Any]]:
@@ -215,7 +235,7 @@ def replayed(folder: Path, robot: Mechanism | str, rows: Array) -> Array:
 
 
 def followed(
-    folder: Path, robot: Mechanism | str, tries: int, reach: float, size: float, seed: int = 0, told: int = 0
+    folder: Path, robot: Mechanism, tries: int, reach: float, size: float, seed: int = 0, told: int = 0
 ) -> tuple[list[int], Array]:
     """Numbers of random steps that are proved for the box, for the line, refused (far, fold), lost; of the proved ones
     those that end elsewhere when they are followed in 500 pieces, those that could not be followed; and those at which
@@ -227,13 +247,26 @@ def followed(
         for name in re.findall(r"^struct (Block\d+)", part, re.MULTILINE)
     ]
     text = f"static double inverse[10000];\n#define CLOSE(Q, X) ({' && '.join(blocks)})\n"
-    program = compiled(folder, code, text + FOLLOW, f"-DNAME={namespace(code)}", "-O2")
-    done = subprocess.run(
-        [program], input=f"{tries} {seed} {reach} {size} {told}\n", capture_output=True, text=True, timeout=tries
-    )
+    program = compiled(folder, code, text + STEP, f"-DNAME={namespace(code)}", "-O2")
+    given = f"{tries} {seed} {reach} {size} {told}\n"
+    done = subprocess.run([program], cwd=folder, input=given, capture_output=True, text=True, timeout=tries)
     assert done.returncode == 0, (done.returncode, done.stderr)
     *rows, counts = done.stdout.splitlines()
-    return [int(word) for word in counts.split()], np.array([[float(word) for word in row.split()] for row in rows])
+    *seen, jumped = map(int, counts.split())
+    (folder / "loops").write_text(describe_loops(robot), encoding="utf-8")
+    build = ["g++", "-std=c++17", "-O3", "-march=native", "-Wno-psabi", FOLLOW, "-o", "follow"]
+    subprocess.run(build, cwd=folder, check=True, timeout=300)
+    found = {}
+    for name in ("steps", "jumps"):
+        with (folder / name).open("rb") as steps:
+            run = subprocess.run(
+                ["./follow", "loops"], cwd=folder, stdin=steps, capture_output=True, text=True, timeout=tries
+            )
+        found[name] = [*map(int, run.stdout.split())]
+    assert found["jumps"] == [jumped, jumped, 0]
+    count, wrong, unsure = found["steps"]
+    assert count == sum(seen[:2])
+    return [*seen, wrong, unsure, jumped], np.array([[float(word) for word in row.split()] for row in rows])
 
 
 REACH = {

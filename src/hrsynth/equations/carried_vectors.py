@@ -129,18 +129,22 @@ def build_row_product(carrier: SweptChains, loop: JointLoop, row: LoopRow) -> Pr
     return Product(k, carrier.point(loop.chains[1], loop.point) - carrier.point(loop.chains[0], loop.point))
 
 
-def add_row_bend(total: Total, carrier: SweptChains, loop: JointLoop, row: LoopRow) -> None:
-    """Add the second derivatives of an equation of a loop to a sum (c, N, N)."""
+def list_row_products(carrier: SweptChains, loop: JointLoop, row: LoopRow) -> list[tuple[Product, float]]:
+    """Return an equation of a loop as a sum of products with weights."""
     if row.kind != "distance":
-        add_bend(total, build_row_product(carrier, loop, row))
-        return
+        return [(build_row_product(carrier, loop, row), 1.0)]
     assert loop.swung is not None
     centre = carrier.system.coordinates[loop.chains[1][loop.swung]].point
     before, after = loop.chains[1][: loop.swung], loop.chains[1][loop.swung + loop.swings :]
     reach = carrier.point(loop.chains[0], loop.point) - carrier.point(before, centre)
     rod = carrier.point(after, loop.point) - CarriedVector(centre)
-    add_bend(total, Product(reach, reach), 0.5)
-    add_bend(total, Product(rod, rod), -0.5)
+    return [(Product(reach, reach), 0.5), (Product(rod, rod), -0.5)]
+
+
+def add_row_bend(total: Total, carrier: SweptChains, loop: JointLoop, row: LoopRow) -> None:
+    """Add the second derivatives of an equation of a loop to a sum (c, N, N)."""
+    for product, weight in list_row_products(carrier, loop, row):
+        add_bend(total, product, weight)
 
 
 class Total:
@@ -169,7 +173,9 @@ class Total:
 
 def add_slope(total: Total, product: Product, weight: Any = 1.0) -> None:
     """Add weight ∇(x · y) to a sum (c, N)."""
-    for vector, other in ((product.x, product.y), (product.y, product.x)):
+    square = product.x is product.y
+    weight = weight * 2.0 if square else weight
+    for vector, other in ((product.x, product.y), (product.y, product.x))[: 1 if square else 2]:
         for part in vector.parts:
             f = other.value * (part.sign * _convert_to_column(weight))
             total.add((part.places,), (part.columns * f[..., None, :]).sum(-1))
