@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..mechanism.model import Mechanism
-    from ..mechanism.pose import Pose
+    from ..mechanism.pose import Grid, Pose
 
 PICTURES = (*FIGURES, ".gif")
 """Suffixes of figures."""
@@ -199,19 +199,28 @@ def draw(
     file: str | Path | None = None,
     *,
     plane: Pose | str | None = None,
+    grid: Grid | str | None = None,
     steps: int = 51,
     width: str | None = None,
     font: str | None = None,
     ax: None = None,
 ) -> Picture: ...
 @overload
-def draw(result: Result, *, plane: Pose | str | None = None, steps: int = 51, ax: Axes | Sequence[Axes]) -> None: ...
+def draw(
+    result: Result,
+    *,
+    plane: Pose | str | None = None,
+    grid: Grid | str | None = None,
+    steps: int = 51,
+    ax: Axes | Sequence[Axes],
+) -> None: ...
 @with_spelling
 def draw(
     result: Result,
     file: str | Path | None = None,
     *,
     plane: Pose | str | None = None,
+    grid: Grid | str | None = None,
     steps: int = 51,
     width: str | None = None,
     font: str | None = None,
@@ -227,6 +236,8 @@ def draw(
         File to write: .png, .pdf or .svg; of a servo run also .gif; of a derivation .svg.
     plane
         Plane of poses of the Type 2 locus, of the result of ``singularities``.
+    grid
+        Two ranges of the pose, of joints or of motors for that locus instead, as ``"motors:a=-1:1:41,b=-1:1:41"``.
     steps
         Poses per side of the plane, 5 to 300.
     width
@@ -253,7 +264,7 @@ def draw(
     'png'
     """
     require_range("steps", steps, "an integer", 5, 300)
-    asked: dict[str, Any] = {"plane": plane, "steps": steps, "seed": 0, "width": width, "font": font}
+    asked: dict[str, Any] = {"plane": plane, "grid": grid, "steps": steps, "seed": 0, "width": width, "font": font}
     if ax is not None:
         asked["axes"] = tuple(ax.flat if hasattr(ax, "flat") else ax if isinstance(ax, Sequence) else (ax,))
         if file is not None or width is not None or font is not None:
@@ -264,8 +275,8 @@ def draw(
         endings = tuple(each for each in PICTURES if each in drawn.makers)
         if not endings or (drawn.part is not None and getattr(result, drawn.part) is None):
             continue
-        if plane is not None and "plane" not in drawn.takes:
-            raise BadRequest("plane: not for this result", type(result).__name__, "result of singularities")
+        if (plane, grid) != (None, None) and "plane" not in drawn.takes:
+            raise BadRequest("plane, grid: not for this result", type(result).__name__, "result of singularities")
         if not drawn.drawn and any(value is not None for value in (width, font, ax)):
             raise BadRequest("width, font, ax: not for this result", type(result).__name__, remedy="Omit them.")
         draws = partial(_render_content, drawn, result, asked)
