@@ -53,7 +53,7 @@ JUNK: list[Any] = [
 ]
 FIELDS = {
     "open": ("watch", "camera", "here", "robot"),
-    "move": ("values", "platform", "hidden", "here", "watch"),
+    "move": ("values", "platform", "motors", "hidden", "here", "watch"),
     "watch": ("watch", "camera", "here"),
     "play": ("lost", "hidden", "here", "watch"),
     "answer": ("camera",),
