@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from description.foreign.rounded import of_hinges
-from hrsynth import branch, load, modes
+from hrsynth import branch, check, load, modes
 from hrsynth.analysis.branch.answer import BranchProof
 from hrsynth.analysis.branch.cells import _bound_smallest_value
 from hrsynth.analysis.branch.growth import CellGrid, split_box
@@ -521,3 +521,36 @@ def test_a_time_limit_ends_with_what_is_proved():
     short, long = (branch("rrrrr_m1", max_cells=130, time_limit=limit).parts[0] for limit in (0.0, None))
     assert 0.0 < short.volume_fraction < long.volume_fraction
     assert connected(short)
+
+
+def follow(robot: Mechanism, places: np.ndarray) -> np.ndarray:
+    """The elbows at motors (n, 2) by small Newton steps of Pinocchio's loops from zero, not by the proof."""
+    found = check(robot, at=[{"motors": q} for q in places.tolist()]).postures
+    return np.array([[each.coordinates.joints[name] for name in ("elbow_1", "elbow_2")] for each in found])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("low", "high"), [(-0.1, 0.12), (-0.02, 0.3)])
+def test_the_safe_box_keeps_limits_up_to_one_of_them(low: float, high: float):
+    """Corners and random motors of the box are within the limits; a little beyond a side a joint passes one."""
+    free = load("rrrrr_m1")
+    elbows = [replace(free.joints[name], limits=Limits(low, high)) for name in ("elbow_1", "elbow_2")]
+    found = branch(free.changed(joints=elbows), {"shoulder_1": (-0.3, 0.3), "shoulder_2": (-0.3, 0.3)})
+    box, whole = np.array(found.safe_box), np.array(found.proved)
+    assert np.all((whole[0] <= box[0]) & (box[0] < 0) & (box[1] > 0) & (box[1] <= whole[1]))
+    corners = np.array(np.meshgrid(*box.T)).reshape(2, -1).T
+    values = follow(free, np.concatenate([corners, np.random.default_rng(0).uniform(*box, (20, 2))]))
+    assert np.all((values >= low - 1e-9) & (values <= high + 1e-9))
+    stopped = [side for side in np.ndindex(2, 2) if box[side] != whole[side]]
+    assert stopped
+    for side, k in stopped:
+        beyond = corners.copy()
+        beyond[:, k] = box[side, k] + (-1, 1)[side] * 0.02
+        values = follow(free, beyond)
+        assert values.min() < low or values.max() > high
+
+
+def test_without_limits_the_safe_box_is_the_proved_one():
+    found = branch("rrrrr_m1", {"shoulder_1": (-0.1, 0.1), "shoulder_2": (-0.1, 0.1)})
+    np.testing.assert_array_equal(found.safe_box, found.proved)
+    assert found.to_dict()["safe_box"] == [[-0.1, -0.1], [0.1, 0.1]]

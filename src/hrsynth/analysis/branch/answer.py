@@ -185,6 +185,8 @@ class BranchProof(Result, shown_as="branch"):
         Number of cells that were tried.
     limits
         Limits of the joints without a motor.
+    safe_box
+        Box of all motors (m, rad), low and high (n,) each, with all examined joints within their limits (proved).
     """
 
     robot: Mechanism
@@ -204,6 +206,14 @@ class BranchProof(Result, shown_as="branch"):
     """Cells that were tried."""
     limits: Recorded[tuple[BranchLimit, ...]]
     """The limits of joints without a motor."""
+    safe_box: Annotated[
+        tuple[Array, Array] | None,
+        Table | None,
+        "low and high of a box of all motors about the zero configuration within the limits of all joints examined "
+        "(proved), or null",
+    ] = None
+    """Box of all motors (m, rad), low and high (n,) each, in the proved box (where that may have Type 1 singularities:
+    in the injective box), in which all examined joints are proved to be within their limits."""
 
     @property
     def setup(self) -> Mechanism:

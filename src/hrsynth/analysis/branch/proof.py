@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
@@ -18,13 +19,14 @@ from ...progress import report
 from ...tolerances import CLOSURE_RESIDUAL_TOL
 from ..analysis_declaration import analysis
 from ..observed import RobotLike, read_robot
-from .answer import BranchCell, BranchPart, BranchProof
+from .answer import PASSED, BranchCell, BranchPart, BranchProof
 from .cells import prove_all
 from .ends import find_toggles, list_full_turns
 from .growth import CellGrid, GrownCell, Growth, find_largest_box, make_whole_cell, split_box
 from .injectivity import prove_injective_box
 from .limits import list_branch_limits
 from .redundant import bound_closure_error, list_unexplained_equations
+from .safe_box import find_safe_box
 
 BRANCH_CELLS_MAX = 1000
 """Largest number of cells of motor coordinates in the proof of a branch, per part of the loops."""
@@ -149,21 +151,47 @@ def prove_branch(
             growth.extend(part)
         found.append(_answer(part, growth))
     units, names = system.units[list(system.driven)], system.names
+    injective = None if back is None else (back[0] * units, back[1] * units)
     passive = tuple(names[i] for part in parts for i in part.unknowns)
     idle = tuple(names[i] for i in held)
-    return BranchProof(
+    proof = BranchProof(
         mechanism,
         system,
         tuple(names[i] for i in system.driven),
         passive,
         idle,
         tuple(found),
-        None if back is None else (back[0] * units, back[1] * units),
+        injective,
         regular,
         source,
         sum(growth.tried for growth in grown),
         tuple(list_branch_limits(mechanism, motors, found, idle)),
     )
+    return replace(proof, safe_box=_find_safe_box(proof, grown))
+
+
+def _find_safe_box(proof: BranchProof, grown: Sequence[Growth]) -> tuple[Array, Array] | None:
+    """The box in which all joints are within their limits, for all parts together; None without one."""
+    if any(limit.joint in proof.fixed and limit.verdict == PASSED for limit in proof.limits):
+        return None
+    system, outer = proof.system, proof.proved if proof.regular or proof.injective_box is None else proof.injective_box
+    limits = {
+        i: (low / system.units[i], high / system.units[i])
+        for i, name in enumerate(system.names)
+        for low, high in [proof.robot.filed.get(name, (-np.inf, np.inf))]
+        if np.isfinite([low, high]).any()
+    }
+    low, high = np.array(outer)
+    for part, growth in zip(proof.parts, grown, strict=True):
+        places, units = [proof.motors.index(name) for name in part.motors], system.units[list(growth.part.driven)]
+        box = find_safe_box(growth, limits, low[places] / units, high[places] / units)
+        if box is None:
+            return None
+        whole = box[0] == low[places] / units, box[1] == high[places] / units
+        low[places] = np.where(whole[0], low[places], box[0] * units)
+        high[places] = np.where(whole[1], high[places], box[1] * units)
+    ends = np.array([proof.robot.filed.get(name, (-np.inf, np.inf)) for name in proof.motors]).reshape(-1, 2)
+    return np.maximum(low, ends[:, 0]), np.minimum(high, ends[:, 1])
 
 
 Shaped = tuple[LoopSystem, tuple[LoopPart, ...], tuple[int, ...]]

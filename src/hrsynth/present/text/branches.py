@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ...analysis.branch.answer import UNSEEN
 from .tables import Rows, format_listing, format_robot_row
 
 if TYPE_CHECKING:
@@ -30,7 +31,20 @@ def format_branch(found: BranchProof) -> str:
         rows += _format_part(part)
     if not found.parts:
         rows.append(("branch", "no loops: the motors are the only joints"))
-    return format_listing(rows + _format_inverse_rows(found))
+    return format_listing(rows + _format_inverse_rows(found) + _format_safe_box(found))
+
+
+def _format_safe_box(found: BranchProof) -> Rows:
+    """Return the row of the box of motors within all limits and without singularity."""
+    if found.safe_box is None or not found.parts:
+        return []
+    box = ",".join(
+        f"{name}={low:.6g}:{high:.6g}" for name, low, high in zip(found.motors, *found.safe_box, strict=True)
+    )
+    kinds = "Type 1 or 2" if found.regular or found.injective_box is not None else "Type 2"
+    unseen = ", ".join(limit.joint for limit in found.limits if limit.verdict == UNSEEN)
+    within = f"all joints within their limits{f' (not examined: {unseen})' * bool(unseen)}"
+    return [("safe box", f"{box}: {within}, no {kinds} singularity on this branch, proved")]
 
 
 def format_limit_rows(found: BranchProof) -> Rows:
