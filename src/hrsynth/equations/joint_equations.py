@@ -325,21 +325,13 @@ def _compute_product(R: Any, K: Array) -> Any:
 
 
 def evaluate_residuals(
-    system: LoopSystem,
-    loop: JointLoop,
-    values: Any,
-    rows: Sequence[LoopRow],
-    known: dict[tuple[int, ...], Swept] | None = None,
+    system: LoopSystem, loop: JointLoop, values: Any, rows: Sequence[LoopRow]
 ) -> tuple[list[Any], list[dict[int, Any]]]:
     """The values (…) of some equations of a loop, and of each the derivatives by the coordinates of its chains that are
-    not None; ``known``: chains at these values, to which others are added."""
-    known = {} if known is None else known
-    one = _sweep_once(system, loop.chains[0], values, known)
-    a = one.at(loop.point)
-    if any(row.kind != "distance" for row in rows):
-        two = _sweep_once(system, loop.chains[1], values, known)
-        b = two.at(loop.point)
+    not None."""
+    one, two = (system.displacement(chain, values) for chain in loop.chains)
     moving = [[(place, i) for place, i in enumerate(chain) if values[i] is not None] for chain in loop.chains]
+    a, b = one.at(loop.point), two.at(loop.point)
     found: list[Any] = []
     slopes: list[dict[int, Any]] = []
     for row in rows:
@@ -363,16 +355,9 @@ def evaluate_residuals(
                     turned = swept.turned(place, own)
                     slope[i] = compute_dot_forms(turned, far) if turned is not None else 0.0
         else:
-            found.append(_evaluate_distance(system, loop, values, a, slope, known))
+            found.append(_evaluate_distance(system, loop, values, one, a, slope))
         slopes.append(slope)
     return found, slopes
-
-
-def _sweep_once(system: LoopSystem, chain: tuple[int, ...], values: Any, known: dict[tuple[int, ...], Swept]) -> Swept:
-    """Return a chain at some values, evaluated if it is not known."""
-    if chain not in known:
-        known[chain] = system.displacement(chain, values)
-    return known[chain]
 
 
 def locate_rod_ends(system: LoopSystem, loop: JointLoop, values: Any) -> tuple[Any, Any, Any]:
@@ -384,18 +369,13 @@ def locate_rod_ends(system: LoopSystem, loop: JointLoop, values: Any) -> tuple[A
 
 
 def _evaluate_distance(
-    system: LoopSystem,
-    loop: JointLoop,
-    values: Any,
-    a: Any,
-    slope: dict[int, Any],
-    known: dict[tuple[int, ...], Swept],
+    system: LoopSystem, loop: JointLoop, values: Any, one: Swept, a: Any, slope: dict[int, Any]
 ) -> Any:
     """(|a − A|² − |b − A|²) / 2 and its derivatives: A and b are seen without the joint that is left out."""
     assert loop.swung is not None
     before, after = loop.chains[1][: loop.swung], loop.chains[1][loop.swung + loop.swings :]
     centre = system.coordinates[loop.chains[1][loop.swung]].point
-    one, near, far = (_sweep_once(system, chain, values, known) for chain in (loop.chains[0], before, after))
+    near, far = system.displacement(before, values), system.displacement(after, values)
     A, b = near.at(centre), far.at(loop.point)
     reach, rod = a - A, b - centre
     for chain, swept, v, p, sign in (

@@ -17,7 +17,7 @@ from ..results import Value
 from ..solving.newton import ApproachedZeros, approach_zeros
 from ..tolerances import CLOSURE_SOLVER_TOL, NAMED_TWIST_TOL, RANK_CUTOFF_FRACTION
 from .carried_vectors import SweptChains, Total, add_slope, list_row_products
-from .joint_equations import CouplingEquation, JointLoop, LoopRow, LoopSystem, Swept, evaluate_residuals
+from .joint_equations import CouplingEquation, JointLoop, LoopRow, LoopSystem, evaluate_residuals
 
 DISTANCE = LoopRow("distance")
 LOOP_PART_NEWTON_STEPS_MAX = 30
@@ -189,12 +189,11 @@ def evaluate_equations(
                 values[k] = values[k] + system.coordinates[i].from_zero(forms[i]) * rate
         else:
             groups.setdefault(id(each.of), []).append(k)
-    known: dict[tuple[int, ...], Swept] = {}
     for members in groups.values():
         loop = equations[members[0]].of
         rows = [row for row in (equations[k].row for k in members) if row is not None]
         assert isinstance(loop, JointLoop)
-        found = evaluate_residuals(system, loop, forms, rows, known)
+        found = evaluate_residuals(system, loop, forms, rows)
         for k, value, slope in zip(members, *found, strict=True):
             values[k], slopes[k] = value, slope
     return values, slopes
@@ -212,33 +211,33 @@ def derive_equations(
     zero."""
     if not equations:
         return np.zeros((*shape, 0)), np.zeros((*shape, 0, len(values)))
-    errors, rates = differentiate_equations(system, equations, values, np.zeros(shape), range(len(values)))
+    errors, rates = evaluate_by_vectors(system, equations, values, np.zeros(shape), range(len(values)))
     return np.stack(errors, axis=-1), np.stack(rates, axis=-2)
 
 
-def differentiate_equations(
+def evaluate_by_vectors(
     system: LoopSystem, equations: Sequence[LoopEquation], values: Any, zero: Any, places: Sequence[int]
 ) -> tuple[list[Any], list[Any]]:
-    """As :func:`evaluate_equations`, with derivatives (…, m) by the coordinates ``places`` (m,), the only
-    ones that count, at floats or forms of the shape of ``zero``; each vector and its derivatives are evaluated once."""
-    values = [each if i in places else None for i, each in enumerate(values)]
+    """As :func:`evaluate_equations`, with derivatives (…, m) by the coordinates ``places`` (m,), the only ones that
+    count, at floats or forms of the shape of ``zero``; vectors and their derivatives are evaluated once."""
     order = np.zeros(len(values), dtype=np.intp)
     order[list(places)] = np.arange(len(places))
-    carrier, found, slopes = SweptChains(system, values, order), list[Any](), list[Any]()
-    for each in equations:
-        value, slope = zero, Total(zero, (len(places),))
-        if isinstance(each.of, CouplingEquation):
-            for i, rate in each.of.slope.items():
-                if values[i] is not None:
-                    value = value + system.coordinates[i].from_zero(values[i]) * rate
+    carrier = SweptChains(system, [form if i in places else None for i, form in enumerate(values)], order)
+    errors, slopes = list[Any](), list[Any]()
+    for equation in equations:
+        error, slope = zero, Total(zero, (len(places),))
+        if isinstance(equation.of, CouplingEquation):
+            for i, rate in equation.of.slope.items():
+                if carrier.values[i] is not None:
+                    error = error + system.coordinates[i].from_zero(values[i]) * rate
                     slope.add(([order[i]],), rate)
-        elif each.row is not None:
-            for product, weight in list_row_products(carrier, each.of, each.row):
-                value = value + product.value * weight
+        elif equation.row is not None:
+            for product, weight in list_row_products(carrier, equation.of, equation.row):
+                error = error + product.value * weight
                 add_slope(slope, product, weight)
-        found.append(value)
+        errors.append(error)
         slopes.append(slope.sum)
-    return found, slopes
+    return errors, slopes
 
 
 def evaluate_all_equations(

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from ...equations.carried_vectors import SweptChains, Total, add_row_bend
 from ...equations.joint_equations import JointLoop, LoopRow, locate_rod_ends
-from ...equations.loop_parts import LoopBlock, LoopEquation, LoopPart, differentiate_equations
+from ...equations.loop_parts import LoopBlock, LoopEquation, LoopPart, evaluate_by_vectors
 from ...geometry.affine import AffineForms, combine, compute_dot_forms, compute_right_product, make_affine, stack
 from ...geometry.vectors import Array, times
 from ...solving.krawczyk import bound_contraction, bound_image
@@ -294,7 +294,7 @@ def evaluate_slopes(
 ) -> tuple[AffineForms, AffineForms]:
     """Equations (c, k) over tubes with radii (c, p), and their derivatives by coordinates ``places``, (c, k, m)."""
     forms, system = trial.forms(radius), trial.part.system
-    values, slopes = differentiate_equations(system, equations, forms, _make_zero_form(trial), places)
+    values, slopes = evaluate_by_vectors(system, equations, forms, _make_zero_form(trial), places)
     return stack(values), stack(slopes, axis=-2)
 
 
