@@ -48,11 +48,11 @@ class Condition(Value):
         """Rows (n, rows, d) that have a kernel exactly where a platform dof is unobserved."""
         raise NotImplementedError
 
-    def evaluate(self, here: PatternValues) -> Array:
+    def evaluate(self, here: PatternValues, rows: Array | None = None) -> Array:
         """The expression's value, (n,), as a first power of the distance to the locus (the root of a sum of squares).
 
-        Here that of the determinant of a Gram matrix of the rows."""
-        M = self.rows(here)
+        Here that of the determinant of a Gram matrix of the rows, unless they are known."""
+        M = self.rows(here) if rows is None else rows
         return np.sqrt(np.abs(np.linalg.det(M.transpose(0, 2, 1) @ M)))
 
 
@@ -65,14 +65,14 @@ class NamedCondition(Condition):
     def rows(self, here: PatternValues) -> Array:
         return compute_leg_rows(self.pattern, here.values)
 
-    def evaluate(self, here: PatternValues) -> Array:
+    def evaluate(self, here: PatternValues, rows: Array | None = None) -> Array:
         import sympy
 
         if isinstance(self.expression, sympy.Determinant):
             return (
                 np.linalg.det(compute_normal_lines(self.pattern, here.values))
                 if self.signed
-                else super().evaluate(here)
+                else super().evaluate(here, rows)
             )
         found = evaluate(self.expression, here.values)
         return found if self.signed else np.sqrt(np.abs(found))

@@ -17,7 +17,7 @@ from ...batch.configuration_builder import ConfigurationBuilder
 from ...constraints.condition import Condition, NamedCondition
 from ...constraints.pattern import ConstraintPattern, PatternValues
 from ...errors import Disagreement, UndefinedValue
-from ...geometry.ranks import compute_kernel_basis
+from ...geometry.ranks import compute_matrix_spectra, decompose_matrices
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.limits import is_within_limits, mark_beyond_limits
@@ -49,6 +49,8 @@ LOCUS_POSES_COUNT = 10
 LOCUS_SEARCH_STARTS_COUNT = 4
 """Number of poses nearest a singularity from which the locus is searched, if the expression has no sign across it, or
 none was found."""
+LOCAL_MINIMUM_DECREASE_FRACTION = 1e-6
+"""Fraction of its cost by which a step towards the locus must lower it: less is a minimum beside the locus."""
 WeakPose = tuple[tuple[bool, float], ClosedConfiguration]
 """A pose, whether joints are beyond their limits there, and its smallest singular value."""
 
@@ -119,7 +121,7 @@ def compare_condition(
                 condition,
             )[1]
         matrices = condition.rows(here)
-        spectra, values = np.linalg.svd(matrices, compute_uv=False), condition.evaluate(here)
+        spectra, values = np.linalg.svd(matrices, compute_uv=False), condition.evaluate(here, matrices)
         rows, others = spectra[:, -1].astype(float), spectra[:, :-1].prod(axis=1)
         angle = max(angle, apart)
         smallest = min(smallest, float(ranks.min()))
@@ -297,9 +299,13 @@ def _verify_smallest_values(
     labels = np.repeat([o.leg for o in observation_model.observations], observation_model.sizes)
     angle = 0.0
     for leg in here.pattern.legs if named else ():
-        for (rates, twists, _), block in zip(parts, here.allowances(leg), strict=True):
-            held, _ = compute_kernel_basis(rates[np.isin(labels, leg.held_by)], 1.0)
-            angle = max(angle, float(np.linalg.norm(block @ twists @ held, 2)))
+        locked = np.isin(labels, leg.held_by)
+        spectra = compute_matrix_spectra([rates[locked] for rates, _, _ in parts], 1.0)
+        products = [
+            block @ twists @ spectrum.kernel
+            for (_, twists, _), block, spectrum in zip(parts, here.allowances(leg), spectra, strict=True)
+        ]
+        angle = max(angle, *(s[0] for _, s, _ in decompose_matrices(products) if len(s)), 0.0)
     return sigma, angle
 
 
@@ -387,7 +393,7 @@ def descend(
     if there is none near."""
     from scipy.optimize import least_squares
 
-    here = start
+    here, before = start, np.inf
     for _ in range(4):
         motion = compute_platform_motions(here, observation_model)
         count = motion.shape[1]
@@ -419,7 +425,7 @@ def descend(
             np.concatenate([np.zeros(count), x0]),
             bounds=(-limits, limits),
             xtol=1e-15,
-            ftol=1e-15,
+            ftol=LOCAL_MINIMUM_DECREASE_FRACTION,  # costs that end at zero fall by more
             gtol=1e-15,
             max_nfev=60,
         )
@@ -429,4 +435,7 @@ def descend(
         here = ClosedConfiguration.of(there.model, there.q)
         if np.linalg.norm(fit.fun) < HIDDEN_ROBOT_RESIDUAL_TOL:
             return here
+        if fit.cost > before / 2:
+            return None
+        before = fit.cost
     return None

@@ -21,10 +21,11 @@ from ...tolerances import (
     HIDDEN_ROBOT_RESIDUAL_TOL,
     PSEUDOINVERSE_CUTOFF_FRACTION,
     RANK_CUTOFF_FRACTION,
-    SINGULAR_POSE_RESIDUAL_TOL,
     SLOPE_STEP_MAX,
 )
 
+STEP_RESIDUAL_TOL = 1e-14
+"""Closure residual (characteristic lengths, radians) at which a step's Newton iteration ends, just above rounding."""
 RANK_DESCENTS, RANK_STEPS = 6, 40
 """Poses from which the smallest singular value is minimised, and steps of each."""
 
@@ -82,5 +83,5 @@ def compute_twist_rates(found: VelocityRelation) -> tuple[Array, Array]:
 
 def step_from(here: ClosedConfiguration, step: Array) -> ClosedConfiguration:
     """Configuration after a step (nv,), closed as precisely as possible; its residual shows the closure."""
-    q, residual = solve(here.model, here.model.integrate(here.q, step), tolerance=SINGULAR_POSE_RESIDUAL_TOL)
+    q, residual = solve(here.model, here.model.integrate(here.q, step), tolerance=STEP_RESIDUAL_TOL)
     return ClosedConfiguration(here.model, q, residual)
