@@ -10,8 +10,6 @@ from their centroid): a length divided by it is a pure number, as an angle is.
 
 CLOSURE_SOLVER_TOL = 1e-12
 """Closure residual (characteristic lengths, radians) at which the loop solver stops."""
-SINGULAR_POSE_RESIDUAL_TOL = 1e-15
-"""Closure residual of singular poses that are needed to full precision."""
 CLOSURE_RESIDUAL_TOL = 1e-10
 """Residual (characteristic lengths, radians) below which a configuration counts as closed."""
 WAYPOINT_RESIDUAL_TOL = 1e-3

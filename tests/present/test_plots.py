@@ -12,7 +12,7 @@ import pytest
 import hrsynth
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load
-from hrsynth.mechanism.pose import Pose
+from hrsynth.mechanism.pose import Grid
 from hrsynth.present import maps, palette, plots
 from hrsynth.present.figure_format import PNG, print_figure, wrap_labels
 from hrsynth.present.plots import MapPlane, format_ticks, round_ticks
@@ -61,7 +61,7 @@ def test_notebooks_that_plot_use_it():
 
 def test_what_is_held_is_said_in_metres_and_degrees():
     figure, _ = plots.make_panels(1, 1, 3, 3)
-    plots.draw_heading(figure, "title", Pose(z=-0.7, phi=np.pi / 6))
+    plots.draw_heading(figure, "title", Grid.parse("x=0:1:2,z=-0.7,phi=30deg"))
     assert figure.get_suptitle() == "title\nz = -0.7 m, φ = 30°"
 
 

@@ -217,11 +217,12 @@ def sweep(
 def _sweep_joints(
     start: ClosedConfiguration, motion: PlatformMotion, grid: Grid
 ) -> Iterator[ClosedConfiguration | None]:
-    """Yield the configurations of a grid of joints or motors, each at the end of the straight line from zero."""
+    """Yield the configurations of a grid of joints or motors, each at the end of the straight line from zero, joints
+    beyond their limits too."""
     for number, asked in enumerate(grid.requests_at(np.ndindex(grid.shape)), 1):
         report("poses", number, grid.size)
         try:
-            yield track_to_joints(start, motion, cast(JointPose, asked))[0]
+            yield track_to_joints(start, motion, cast(JointPose, asked), within_limits=False)[0]
         except PoseReachFailure:
             yield None
 

@@ -168,10 +168,10 @@ def _solve_link_poses(mechanism: Mechanism, at: str) -> dict[str, Array]:
     from ..mechanism.pose import parse_pose
 
     (configuration,) = solve_configurations(ObservedRobot.of(mechanism), [parse_pose(at)])
-    found = collect_link_poses(configuration)
-    if found is None:
+    link_poses = collect_link_poses(configuration)
+    if link_poses is None:
         raise BadRequest(f"{mechanism.name}: the joints of the file do not fit this configuration", at)
-    return found
+    return link_poses
 
 
 def verify(certificate: str, robot: str | None, json: bool) -> None:
@@ -236,7 +236,12 @@ def add(app: Group) -> None:
                 "FORMAT",
                 words=list_format_names,
             ),
-            Option("at", f"Write the robot at this pose as keyframe {KEYFRAME!r}.", "POSE", group=OUTPUT),
+            Option(
+                "at",
+                f"Write the robot at this pose as keyframe {KEYFRAME!r}: MJCF, or URDF with an SRDF file.",
+                "POSE",
+                group=OUTPUT,
+            ),
             JSON,
             EXPLAIN,
         ),

@@ -55,8 +55,8 @@ def convert_to_file_joints(at: ClosedConfiguration) -> ClosedConfiguration | Non
 
 def collect_link_poses(at: ClosedConfiguration) -> dict[str, Array] | None:
     """Return the poses (4, 4) of the file's links in the base frame, metres; None if the file's joints do not fit."""
-    own = convert_to_file_joints(at)
-    return None if own is None else {link: own.pose(link) for link in own.model.mechanism.links}
+    filed = convert_to_file_joints(at)
+    return None if filed is None else {link: filed.pose(link) for link in filed.model.mechanism.links}
 
 
 def read_joints(at: ClosedConfiguration) -> dict[str, tuple[float, ...]]:
@@ -143,17 +143,18 @@ class JointLine(Value):
 
 
 def track_to_joints(
-    start: ClosedConfiguration, motion: PlatformMotion, asked: JointPose
+    start: ClosedConfiguration, motion: PlatformMotion, asked: JointPose, *, within_limits: bool = True
 ) -> tuple[ClosedConfiguration, JointLine]:
     """Return the configuration with these coordinates that small steps reach from the zero configuration ``start`` on
-    its branch, all joints within their limits, and the line; coordinates that depend on others must agree with them.
+    its branch, all joints ``within_limits`` or not, and the line; coordinates that depend on others must agree with
+    them.
 
     Raises ``BadRequest`` for unknown joints, their number and values beyond limits, ``PoseReachFailure`` if the path
     ends before, with the joint that stops it."""
     home, name = convert_to_file_joints(start), start.model.mechanism.name
     if home is None:
         raise PoseReachFailure(name, str(asked), 0.0, "", reason="the file's joints do not fit its normal form")
-    found, line = _lead(home, motion, _convert_requested(home, asked), asked)
+    found, line = _lead(home, motion, _convert_requested(home, asked), asked, within_limits)
     if home is start:
         return found, line
     try:
@@ -205,7 +206,11 @@ def _convert_requested(home: ClosedConfiguration, asked: JointPose) -> dict[str,
 
 
 def _lead(
-    home: ClosedConfiguration, motion: PlatformMotion, wanted: Mapping[str, tuple[float, ...]], asked: JointPose
+    home: ClosedConfiguration,
+    motion: PlatformMotion,
+    wanted: Mapping[str, tuple[float, ...]],
+    asked: JointPose,
+    within_limits: bool,
 ) -> tuple[ClosedConfiguration, JointLine]:
     """Follow steps from the zero configuration to coordinates, as many of them at a time as are independent."""
     from scipy.linalg import qr
@@ -229,7 +234,7 @@ def _lead(
 
     def past(at: ClosedConfiguration) -> dict[str, float]:
         """Return the joints that are farther beyond their limits than they were, and by how much."""
-        margins = stops.margins(model, at.q).items()
+        margins = stops.margins(model, at.q).items() if within_limits else ()
         return {joint: margin for joint, margin in margins if margin < min(before[joint], 0.0) - POINT_DISTANCE_TOL}
 
     def refuse(stopped: str) -> PoseReachFailure:

@@ -18,7 +18,6 @@ from ..tolerances import (
     EXACT_INCIDENCE_TOL,
     NONZERO_SINGULAR_VALUE_MIN,
     RANK_GAP_MIN,
-    SINGULAR_POSE_RESIDUAL_TOL,
     SLOPE_STEP_MAX,
 )
 from .branch_tests import OperationMode, Signature, group_modes
@@ -27,6 +26,8 @@ from .tasks import TaskBatch, solve, solve_together
 from .velocity_relation import ObservationModel, compute_relation
 from .walking import HALVED, draw_velocity, step_along, walk_randomly
 
+SINGULAR_POSE_RESIDUAL_TOL = 1e-15
+"""Closure residual of singular poses that are needed to full precision."""
 TANGENT_ROTATION_TOL = 1e-10
 """Turn (radians) of the tangent space that the residual of a sample may cause."""
 FIRST_ORDER_STEP_MIN_FRACTION = 0.5

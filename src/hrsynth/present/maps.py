@@ -61,6 +61,8 @@ LOCI = {
     "hidden robot": (palette.get_colour("actuator"), "solid", "o"),
     "real robot": (palette.PAGE["ink"], "dashed", "s"),
 }
+SHADED_DECADES_MIN = 2.0
+"""Decades of the distance that the shades of a locus map span at least: nothing is black far from a singularity."""
 TYPE_1_BOUNDARY_FRACTION = 0.5
 """Fraction of its median below which the Type 1 distance marks a boundary of that kind."""
 ERRORS = "cividis"
@@ -233,7 +235,7 @@ def draw_locus_map(found: Singularity, drawn: Locus, paper: Paper = PNG) -> byte
         place,
         np.where(np.isfinite(drawn.hidden.type2), shade, np.nan),
         cmap="Greys_r",
-        vmin=np.nanmin(shade),
+        vmin=min(np.nanmin(shade), np.nanmax(shade) - SHADED_DECADES_MIN),
         vmax=np.nanmax(shade) + 1.0,
     )
     borders = _draw_boundary(place, plane, drawn)

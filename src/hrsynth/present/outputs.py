@@ -189,8 +189,8 @@ class CodeFile(File):
     def require(self, path: str | None, asked: Asked) -> None:
         """Raise ``BadRequest`` also for the suffix of another language."""
         super().require(path, asked)
-        endings = (".py",) if asked["lang"] == "python" else (".hpp", ".h")
-        if path is not None and Path(path).suffix.lower() not in endings:
+        endings = {"python": (".py",), "c++": (".hpp", ".h")}.get(asked["lang"])  # another is refused by the analysis
+        if path is not None and endings and Path(path).suffix.lower() not in endings:
             raise BadRequest(
                 f"{self.refusal} of --lang {asked['lang']}: extension",
                 path,

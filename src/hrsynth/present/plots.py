@@ -104,7 +104,7 @@ def make_panels(
 def require_axes_count(paper: Paper, count: int) -> None:
     """Raise ``BadRequest`` unless a figure of so many panels fits the given axes."""
     if len(paper.given) != count:
-        raise BadRequest("ax: number of axes for this figure", len(paper.given), str(count))
+        raise BadRequest("ax: number of axes for this figure", len(paper.given), f"{count}, one for each panel")
 
 
 def convert_to_ticks(name: str, values: Array) -> Array:

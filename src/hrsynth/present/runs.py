@@ -65,6 +65,9 @@ def draw_run(found: Servo, paper: Paper = PNG) -> bytes:
     if paper.given:
         require_axes_count(paper, len(panels))
         _draw_curves(paper.given, found, panels)
+        for place in paper.given:
+            if len(place.get_legend_handles_labels()[0]) > 1:
+                place.legend(fontsize="small", framealpha=0.7)
         return b""
     figure = make_empty_figure(paper.wide(WIDE), TALL)
     legs = ", ".join(found.setup.labels)

@@ -246,7 +246,8 @@ def draw(
         Font and size of its text (``"serif 8pt"``).
     ax
         Axes of matplotlib in which to draw a map, the curves of a servo run or a table of aspects instead, in the style
-        of their figure; a sequence of axes if there are several panels.
+        of their figure; a sequence of axes if there are several panels: errors of ``accuracy`` have one for positions
+        and one for orientations, runs of ``servo`` three or four. ``ax.get_legend().remove()`` leaves out a legend.
 
     Returns
     -------

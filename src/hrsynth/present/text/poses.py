@@ -14,7 +14,7 @@ from ...analysis.aspects.verdicts import SAME, SEPARATED
 from ...analysis.aspects.verdicts import UNDECIDED as UNDECIDED_PAIR
 from ...analysis.configuration_report import CONSTRAINT, REGULAR, UNDECIDED
 from ...constraints.condition import General
-from ...mechanism.pose import Pose
+from ...mechanism.pose import JointPose, Pose
 from ...tolerances import DIRECTION_SINE_TOL, INCIDENCE_TOL, RANK_GAP_MIN
 from .robots import NO_MATRIX, format_formation
 from .tables import (
@@ -136,8 +136,15 @@ def format_loop_check(found: LoopCheck) -> str:
 
 def _describe_free_parts(grid: GridCheck) -> str:
     """Describe what a grid leaves free, and where that is."""
-    if grid.grid.joints:
-        return "motors that are not given are at their zero, other joints follow the loops"
+    if isinstance(grid.grid.fixed, JointPose):
+        at = next((posture for posture in grid.postures if posture is not None), None)
+        driven = (
+            set[str]()
+            if at is None or not grid.grid.fixed.motors or at.coordinates is None
+            else {*at.coordinates.motors}
+        )
+        some = bool(driven - {*grid.grid.names, *(name for name, _ in grid.grid.fixed.values)})
+        return "motors that are not given are at their zero, " * some + "other joints follow the loops"
     free = ", ".join(_list_free_parts(grid))
     return f"free, chosen nearest to the zero configuration: {free}" if free else "no free coordinate"
 
