@@ -218,6 +218,8 @@ def test_torques_do_the_same_work_and_limits_are_those_of_corners() -> None:
     power = np.einsum("ni,nij,nj->n", joint, slopes, rate)
     np.testing.assert_allclose(power, np.sum(given * rate, axis=1), atol=1e-12)
     np.testing.assert_allclose(program.motor_torques(slopes, joint), given, atol=1e-12)
+    _, alike = program.joint_limits(slopes, 3.0, 20.0)  # one number for all motors
+    np.testing.assert_array_equal(alike["speed"], program.joint_limits(slopes, np.full(2, 3.0), torques)[1]["speed"])
     _, limits = program.joint_limits(slopes, speeds, torques)
     corners = np.array(list(product([-1, 1], repeat=2)))
     by_corner = [program.joint_torques(slopes, torques * each)[1] for each in corners]

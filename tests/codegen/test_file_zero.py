@@ -264,6 +264,22 @@ def test_a_box_without_the_zero_configuration_names_it(tmp_path: Path):
         hrsynth.export(robot, "python", {"drive": (-0.1, 0.1)})
 
 
+def test_a_box_without_both_zeros_names_the_one_of_the_robot(tmp_path: Path):
+    """And the motor whose interval lacks it, not those that hold it."""
+    case = CASES["palletizer"]
+    robot = hrsynth.load(case.file(tmp_path), platform=case.platform)
+    zeros = {
+        joint.name: 0.0 if joint.offset is None else float(joint.offset[0])
+        for joint in robot.joints.values()
+        if joint.is_actuated
+    }
+    *_, last = zeros
+    assert any(zeros.values())
+    box = {name: (zero - 0.05, zero + 0.05) for name, zero in zeros.items()} | {last: (1.8, 1.9)}
+    with pytest.raises(BadRequest, match=rf"{last}=.* with {zeros[last]:.6g} \(zero configuration\) in it"):
+        hrsynth.branch(robot, box)
+
+
 def test_the_head_states_the_command_and_the_file(tmp_path: Path):
     path = CASES["follower"].file(tmp_path)
     robot = hrsynth.load(path, platform="hand", motors="j1,j3", keyframe="zero")

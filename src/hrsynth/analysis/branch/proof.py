@@ -124,8 +124,9 @@ def prove_branch(
     mechanism.require_motors()
     motors = [name for name, joint in mechanism.joints.items() if joint.is_actuated]
     asked = parse_box(box)
-    if not all(low <= _read_zero(mechanism, name) <= high for name, (low, high) in asked.items()):
-        mechanism = at_file_zero(mechanism) or mechanism
+    if not _has_zero_within(mechanism, asked):
+        filed = at_file_zero(mechanism)
+        mechanism = filed if filed is not None and _has_zero_within(filed, asked) else mechanism
     system, parts, held = choose_shape(mechanism, motors, box, whole)
     intervals, source = _read_box(system, box)
     found, grown = [], []
@@ -168,6 +169,11 @@ def prove_branch(
         tuple(list_branch_limits(mechanism, motors, found, idle)),
     )
     return replace(proof, safe_box=_find_safe_box(proof, grown))
+
+
+def _has_zero_within(mechanism: Mechanism, box: Mapping[str, tuple[float, float]]) -> bool:
+    """Return True if a box of motors holds the zero configuration."""
+    return all(low <= _read_zero(mechanism, name) <= high for name, (low, high) in box.items())
 
 
 def _find_safe_box(proof: BranchProof, grown: Sequence[Growth]) -> tuple[Array, Array] | None:
