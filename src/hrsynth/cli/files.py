@@ -139,7 +139,7 @@ def convert(
     with Progress():
         mechanism = load_robot(source)
         for file in files:
-            require_other(file, name, mechanism.file)
+            require_other(file, name, mechanism.file, beside=target)
         keyframes = None if at is None else {KEYFRAME: _solve_link_poses(mechanism, at)}
         lost = [str(warning) for warning in save(mechanism, target, to, meshes=meshes, keyframes=keyframes)]
     for warning in lost:

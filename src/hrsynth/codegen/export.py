@@ -292,7 +292,13 @@ def _describe_program(
     ]
     ends = zip(branch_.lower.tolist(), branch_.upper.tolist(), strict=True)
     ranges = [f": {low!r} to {high!r}" * jumps for low, high in ends]
-    rows = zip(proof.motors, ranges, branch_.motors, strict=True)
+    places = list(branch_.motors)
+    starts = (branch_.system.zero[places] * branch_.system.units[places]).tolist()
+    spans = [
+        span + f", {start:.6g} at the zero configuration" * bool(start)
+        for span, start in zip(ranges, starts, strict=True)
+    ]
+    rows = zip(proof.motors, spans, branch_.motors, strict=True)
     lines.append(f"Motors in order{', with the ranges of the cells' * jumps}:")
     lines += [f"  q[{k}] {name}{span} ({branch_.unit_name(i)})" for k, (name, span, i) in enumerate(rows)]
     lines += _describe_continuation(source, source.tracker) if source.tracker else []

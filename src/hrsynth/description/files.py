@@ -56,11 +56,12 @@ def require_folder(path: str | Path) -> None:
         raise _make_write_error(f"its folder allows no such file ({_describe_os_error(error)})", path) from None
 
 
-def require_other(path: str | Path, *sources: str | Path | None) -> None:
-    """Raise ``BadRequest`` if a file to write is one that was read."""
+def require_other(path: str | Path, *sources: str | Path | None, beside: str | None = None) -> None:
+    """Raise ``BadRequest`` if a file to write, alone or with the one ``beside`` it, is one that was read."""
     real = os.path.realpath(path)
     if any(source is not None and os.path.realpath(source) == real for source in sources):
-        raise BadRequest("cannot write the file: it is the input file", str(path), "another file")
+        what = "the file" if beside in (None, str(path)) else f"the file that goes with {beside}"
+        raise BadRequest(f"cannot write {what}: it is the input file", str(path), "another file")
 
 
 def require_same(path: Path, content: bytes) -> None:

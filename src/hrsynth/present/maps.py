@@ -230,10 +230,11 @@ def draw_locus_map(found: Singularity, drawn: Locus, paper: Paper = PNG) -> byte
 
     plane = MapPlane.of(label_joints(drawn.grid, found.setup.robot).axes, found.setup.motion, 0.4, 1.6)
     figure, (place,) = make_panels(1, 1, 7.2, 6.0 * plane.tall + 1.6, paper)
-    shade = np.log10(np.maximum(drawn.hidden.type2, DARKEST_SINGULAR_VALUE_MAX))
+    shaded = drawn.real if found.real and drawn.real is not None else drawn.hidden
+    shade = np.log10(np.maximum(shaded.type2, DARKEST_SINGULAR_VALUE_MAX))
     plane.cells(
         place,
-        np.where(np.isfinite(drawn.hidden.type2), shade, np.nan),
+        np.where(np.isfinite(shaded.type2), shade, np.nan),
         cmap="Greys_r",
         vmin=min(np.nanmin(shade), np.nanmax(shade) - SHADED_DECADES_MIN),
         vmax=np.nanmax(shade) + 1.0,
@@ -244,7 +245,11 @@ def draw_locus_map(found: Singularity, drawn: Locus, paper: Paper = PNG) -> byte
         if field is not None:
             entries.insert(0, _draw_locus_curve(place, plane, field, name))
     plane.finish(place, plane.x, plane.y)
-    entries += [Patch(facecolor="0.5", label="darker: closer to Type 2"), *borders, *list_limit_entries(drawn.beyond)]
+    entries += [
+        Patch(facecolor="0.5", label="darker: closer to Type 2" + " (real)" * (shaded is drawn.real)),
+        *borders,
+        *list_limit_entries(drawn.beyond),
+    ]
     if drawn.beyond is not None:
         plane.beyond_limits(place, drawn.beyond)
     if not np.isfinite(drawn.hidden.type2).all():
