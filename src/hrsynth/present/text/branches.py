@@ -43,8 +43,8 @@ def _format_safe_box(found: BranchProof) -> Rows:
     )
     kinds = "Type 1 or 2" if found.regular or found.injective_box is not None else "Type 2"
     unseen = ", ".join(limit.joint for limit in found.limits if limit.verdict == UNSEEN)
-    within = f"all joints within their limits{f' (not examined: {unseen})' * bool(unseen)}"
-    return [("safe box", f"{box}: {within}, no {kinds} singularity on this branch, proved")]
+    within = f"all joints within their limits{f' (not examined: {unseen})' * bool(unseen)}, " * bool(found.robot.filed)
+    return [("safe box", f"{box}: {within}no {kinds} singularity on this branch, proved")]
 
 
 def format_limit_rows(found: BranchProof) -> Rows:
