@@ -76,10 +76,10 @@ def track_to_pose(
 def track_to_request(
     start: ClosedConfiguration, observation_model: ObservationModel, asked: Pose | JointPose, motion: PlatformMotion
 ) -> ClosedConfiguration:
-    """The configuration at a pose by its parts, or by joints or motors, that small steps lead to from ``start``; raises
-    as :func:`track_to_pose` and :func:`.track_to_joints`."""
+    """The configuration at a pose by its parts, or by joints or motors, that small steps lead to from ``start``, joints
+    beyond their limits too; raises as :func:`track_to_pose` and :func:`.track_to_joints`."""
     if isinstance(asked, JointPose):
-        return track_to_joints(start, motion, asked)[0]
+        return track_to_joints(start, motion, asked, within_limits=False)[0]
     return track_to_pose(start, observation_model, asked, motion)
 
 

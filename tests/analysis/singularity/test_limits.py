@@ -130,3 +130,16 @@ def test_a_robot_without_limits_has_no_marks() -> None:
     assert checked is not None
     assert checked.beyond is None
     assert "beyond_limits" not in checked.to_dict()
+
+
+def test_the_curve_over_motors_goes_on_beyond_limits() -> None:
+    """As the cells do, which are marked there."""
+    grid = "motors:shoulder_1=-1:1:11,shoulder_2=-1:1:11"
+    free = accuracy(load("rrrrr_m1"), cone="0.1deg", grid=grid).field
+    bound = accuracy(limited("rrrrr_m1", is_elbow, -0.3, 0.3), cone="0.1deg", grid=grid).field
+    assert free is not None
+    assert bound is not None
+    assert bound.beyond is not None
+    assert bound.beyond.any()
+    assert len(free.curve)
+    np.testing.assert_allclose(bound.curve, free.curve, atol=1e-9)
