@@ -362,8 +362,8 @@ class PinocchioModel:
         joints stay."""
         step, turns = self.difference(self.q0, q), np.zeros(self.nv)
         for joint, _, _ in self._parts:
-            if joint.type is not JointType.PRISMATIC and joint.name not in self.mechanism.coupled_joints:
-                places = list(self.coordinates[joint.name])[len(self.coordinates[joint.name]) - len(joint.axes) :]
+            if joint.axes and joint.type is not JointType.PRISMATIC and joint.name not in self.mechanism.coupled_joints:
+                places = list(self.coordinates[joint.name])[-len(joint.axes) :]  # its rotations
                 turns[places] = np.round(step[places] / (2 * np.pi))
         return self.integrate(q, -2 * np.pi * turns)
 

@@ -79,6 +79,8 @@ class Paper:
 
 
 PNG = Paper()
+GIVEN_LEGEND: dict[str, Any] = {"fontsize": "small", "framealpha": 0.7}
+"""Style of a legend in given axes: what it hides can be seen."""
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from ..kinematics.platform_motion import PlatformMotion
 from ..mechanism import Mechanism
 from ..mechanism.pose import ANGLES, TURNS, Grid, JointPose, Pose
 from ..results import Result
-from .figure_format import BESIDE, PNG, GivenFigure, Paper, draw_legend_within, print_figure
+from .figure_format import BESIDE, GIVEN_LEGEND, PNG, GivenFigure, Paper, draw_legend_within, print_figure
 from .skeleton import trace_leg_outlines, trace_link_outline
 from .sketch import Sketch, label_axis
 from .view.view import find_plane_normal
@@ -355,7 +355,7 @@ def draw_legend(figure: Any, entries: Sequence[Any], paper: Paper) -> None:
     if not entries:
         return
     if paper.given:
-        paper.given[0].legend(handles=entries, fontsize="small", framealpha=0.7)
+        paper.given[0].legend(handles=entries, **GIVEN_LEGEND)
         return
     wide = figure.get_figwidth()
     if wide + BESIDE <= paper.room + 1e-9:

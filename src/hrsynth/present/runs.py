@@ -16,7 +16,7 @@ from ..simulation.outcome import ANTIPODAL, BOUNDARY, MINIMUM, MODE, SIGHT, TIME
 from ..simulation.outcome import GOAL as GOAL_REACHED
 from ..simulation.result import Servo
 from . import palette
-from .figure_format import PNG, Paper, draw_legend_within, print_figure, wrap, wrap_title
+from .figure_format import GIVEN_LEGEND, PNG, Paper, draw_legend_within, print_figure, wrap, wrap_title
 from .palette import SERIES
 from .plots import in_style, make_empty_figure, make_legend_entry, require_axes_count
 from .skeleton import trace_leg_outlines, trace_link_outline
@@ -67,7 +67,7 @@ def draw_run(found: Servo, paper: Paper = PNG) -> bytes:
         _draw_curves(paper.given, found, panels)
         for place in paper.given:
             if len(place.get_legend_handles_labels()[0]) > 1:
-                place.legend(fontsize="small", framealpha=0.7)
+                place.legend(**GIVEN_LEGEND)
         return b""
     figure = make_empty_figure(paper.wide(WIDE), TALL)
     legs = ", ".join(found.setup.labels)

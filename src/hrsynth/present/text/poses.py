@@ -14,6 +14,7 @@ from ...analysis.aspects.verdicts import SAME, SEPARATED
 from ...analysis.aspects.verdicts import UNDECIDED as UNDECIDED_PAIR
 from ...analysis.configuration_report import CONSTRAINT, REGULAR, UNDECIDED
 from ...constraints.condition import General
+from ...kinematics.joint_coordinates import list_coordinate_joints
 from ...mechanism.pose import JointPose, Pose
 from ...tolerances import DIRECTION_SINE_TOL, INCIDENCE_TOL, RANK_GAP_MIN
 from .robots import NO_MATRIX, format_formation
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from ...analysis.observed import ObservedRobot
     from ...analysis.singularity.condition_check import Agreement
     from ...analysis.singularity.singularities import Singularity
+    from ...mechanism import Mechanism
 
 STATES = {
     REGULAR: "regular",
@@ -93,7 +95,7 @@ def check(found: Check) -> str:
                     *([found.grid.dependent] if found.grid.dependent else []),
                     *([f"{beyond} beyond joint limits"] if beyond else []),
                     *([f"fixed: {fixed}"] if fixed else []),
-                    _describe_free_parts(found.grid),
+                    _describe_free_parts(found.grid, found.setup.robot),
                 ],
             )
         )
@@ -134,16 +136,12 @@ def format_loop_check(found: LoopCheck) -> str:
     )
 
 
-def _describe_free_parts(grid: GridCheck) -> str:
+def _describe_free_parts(grid: GridCheck, robot: Mechanism) -> str:
     """Describe what a grid leaves free, and where that is."""
-    if isinstance(grid.grid.fixed, JointPose):
-        at = next((posture for posture in grid.postures if posture is not None), None)
-        driven = (
-            set[str]()
-            if at is None or not grid.grid.fixed.motors or at.coordinates is None
-            else {*at.coordinates.motors}
-        )
-        some = bool(driven - {*grid.grid.names, *(name for name, _ in grid.grid.fixed.values)})
+    fixed = grid.grid.fixed
+    if isinstance(fixed, JointPose):
+        motors = {joint.name for joint in list_coordinate_joints(robot, motors=True)} if fixed.motors else set[str]()
+        some = bool(motors - {*grid.grid.names, *dict(fixed.values)})
         return "motors that are not given are at their zero, " * some + "other joints follow the loops"
     free = ", ".join(_list_free_parts(grid))
     return f"free, chosen nearest to the zero configuration: {free}" if free else "no free coordinate"

@@ -10,7 +10,7 @@ import numpy as np
 from ....errors import BadRequest
 from ....geometry.so3 import convert_from_quaternion
 from ....geometry.vectors import build_pose
-from ....kinematics.joint_coordinates import list_coordinate_joints, read_joints, track_to_joints
+from ....kinematics.joint_coordinates import FileCoordinates, track_to_joints
 from ....kinematics.limits import list_joints_beyond
 from ....mechanism.pose import JointPose
 from ....tolerances import SLIDER_TARGET_TOL
@@ -76,11 +76,8 @@ def _drive_motors(request: Request, mover: Mover) -> dict[str, Any]:
 
 def read_motors(posed: RealAndHiddenState) -> list[float]:
     """Return the coordinates of the motors, as the file counts them, in its order."""
-    robot, coordinates = posed.real.model.mechanism, read_joints(posed.real)
     return [
-        value
-        for joint in list_coordinate_joints(robot.written or robot, motors=True)
-        for value in coordinates.get(joint.name, ())
+        number for value in FileCoordinates.of(posed.real).motors.values() for number in np.atleast_1d(value).tolist()
     ]
 
 
