@@ -38,6 +38,7 @@ from .carrying_leg_system import CarriedPlatform
 from .formation_modes import formation_modes
 from .goal_error import drift
 from .methods import better_ways, solve_tips, without_couplings
+from .natural_modes import NaturalPlatform, solve_natural
 from .near import NearMode, measurement_bound, near_modes, poses_alike
 from .planar_loops import PlanarLoops
 from .planar_modes import solve_loops
@@ -55,6 +56,7 @@ WITHIN = {
     "planar": "poses in the plane of motion",
     "spatial": "poses in space",
     "oriented": "poses in space",
+    "kept": "poses at which links keep the directions that they keep in this operation mode",
 }
 """Poses among which the modes are listed, for each kind of the platform's motion."""
 
@@ -154,8 +156,10 @@ class AssemblyModes(Result, shown_as="modes"):
             if isinstance(system, PosedPlatform)
             else "planar"
             if isinstance(system, PlanarLoops)
+            else "kept"
+            if isinstance(system, NaturalPlatform) and system.kept
             else "spatial"
-            if isinstance(system, CarriedPlatform)
+            if isinstance(system, CarriedPlatform | NaturalPlatform)
             else None
         )
         return None if motion is None else WITHIN[motion]
@@ -562,7 +566,7 @@ def _modes_by_system(
         partial(solve_posed, time_limit=time_limit),
     )
     first = (tips, asked, solve_loops) if free is None else (solve_loops, tips, asked)
-    for listed in (*first, solve_carried, solve_loop):
+    for listed in (*first, solve_carried, solve_loop, solve_natural):
         if better is not None and listed not in better:
             continue
         if listed is not solve_loops and not setup.decomposition.is_platform_decided:
