@@ -3,15 +3,17 @@ in one unknown give cases, and combinations of the equations confine what is lef
 
 from __future__ import annotations
 
+import cmath
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..equations.reduction import Reduction, eliminate_linear
 from ..errors import ExternalSolverFailure
 from ..geometry.vectors import Array
 from ..results import Value
-from .confine import confine_solutions
+from .linear_elimination import Reduction, eliminate_linear
+from .solution_boxes import enclose_all_solutions, find_solutions
 from .uniqueness import enclose_unique, is_excluded
 
 CASES_MAX = 512
@@ -21,6 +23,7 @@ OTHER_TERMS_MAX = 1e-9
 LEADING_MIN = 1e-3
 """Smallest coefficient of the square in an equation of length one with one unknown."""
 ROOT_ROUNDING = 2.0**-48
+"""Relative error of the coefficients of a square equation: more than sixteen roundings."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -32,62 +35,86 @@ class SolutionBox(Value):
 
 
 class QuadricSolver:
-    """Solver of a system, with what it did: the number of cases, the unknowns left in the first one, and the largest
-    degree of the combinations."""
+    """Solver of a system, with what it did.
+
+    Attributes
+    ----------
+    cases, solved
+        Number of real cases, and of all.
+    left
+        Unknowns that linear equations leave in the first one.
+    degree
+        Largest degree of the combinations.
+    """
 
     def __init__(self) -> None:
-        self.cases, self.left, self.degree = 0, 0, 0
+        self.cases, self.left, self.degree, self.solved = 0, 0, 0, 0
 
-    def solve(self, matrices: Array, errors: Array, farthest: Array) -> list[SolutionBox]:
-        """Return boxes that hold all real solutions x within bounds.
+    def solve(self, matrices: Array, errors: Array, farthest: Array) -> tuple[list[SolutionBox], Array]:
+        """Return boxes that hold all real solutions x within bounds, and other solutions (k, n), without proof.
 
         Parameters
         ----------
         matrices, errors
-            Symmetric matrices (N, n + 1, n + 1), and bounds (N,) of |(1, x) M (1, x)| at each solution.
+            Symmetric matrices (N, n + 1, n + 1), and bounds (N,) of |(1, x) M (1, x)| at each solution. With complex
+            matrices all solutions are others.
         farthest
-            Bounds (n,) of |x| at each solution.
+            Bounds (n,) of |x| at each real solution.
 
         Raises
         ------
         ExternalSolverFailure
             If the solutions are not confined.
         """
-        self.cases += 1
-        if self.cases > CASES_MAX:
+        self.cases += not np.iscomplexobj(matrices)
+        self.solved += 1
+        if self.solved > CASES_MAX:
             raise ExternalSolverFailure("natural coordinates", f"more than {CASES_MAX} cases")
         reduced = eliminate_linear(matrices, errors, farthest)
-        if self.cases == 1:
+        if self.solved == 1:
             self.left = len(reduced.farthest)
         if _is_contradictory(reduced):
-            return []
+            return [], np.zeros((0, len(farthest)))
+        boxes, others = self._solve_reduced(reduced)
         T = reduced.T[1:]
-        return [
-            SolutionBox(T @ np.append(1.0, box.middle), reduced.slack + np.abs(T[:, 1:]) @ box.radii)
-            for box in self._solve_reduced(reduced)
-        ]
+        return (
+            [
+                SolutionBox(T @ np.append(1.0, box.middle), reduced.slack + np.abs(T[:, 1:]) @ box.radii)
+                for box in boxes
+            ],
+            T[:, 0] + others @ T[:, 1:].T,
+        )
 
-    def _solve_reduced(self, reduced: Reduction) -> list[SolutionBox]:
-        """Return boxes of the unknowns that remain (m,)."""
-        m = len(reduced.farthest)
+    def _solve_reduced(self, reduced: Reduction) -> tuple[list[SolutionBox], Array]:
+        """Return boxes of the unknowns that remain (m,), and other solutions (k, m)."""
+        m, is_complex = len(reduced.farthest), np.iscomplexobj(reduced.table)
         if m == 0:
-            return [SolutionBox(np.zeros(0), np.zeros(0))]
+            return ([], np.zeros((1, 0))) if is_complex else ([SolutionBox(np.zeros(0), np.zeros(0))], np.zeros((0, 0)))
+        if not len(reduced.table):
+            raise ExternalSolverFailure("natural coordinates", f"nothing holds {m} unknowns")
         matrices, errors, boxes = expand(reduced.table, m), reduced.errors, list[SolutionBox]()
         cases = _find_cases(reduced)
         if cases is not None:
+            others = np.zeros((0, m))
             for k, value, off in cases:
-                fixed = np.zeros((1, m + 1, m + 1))
+                fixed = np.zeros((1, m + 1, m + 1), dtype=type(value))
                 fixed[0, 0, 0], fixed[0, 0, k], fixed[0, k, 0] = -value, 0.5, 0.5
-                boxes += self.solve(np.vstack([matrices, fixed]), np.append(errors, off), reduced.farthest)
-            return boxes
-        found = confine_solutions(reduced.table, errors, reduced.farthest)
-        if found is None:
+                more, besides = self.solve(np.vstack([matrices, fixed]), np.append(errors, off), reduced.farthest)
+                boxes, others = boxes + more, np.vstack([others, besides])
+            return boxes, others
+        if is_complex:
+            points = find_solutions(reduced.table, m)
+            if points is None:
+                raise ExternalSolverFailure("natural coordinates", f"{m} unknowns are not isolated")
+            return [], points
+        enclosed = enclose_all_solutions(reduced.table, errors, reduced.farthest)
+        if enclosed is None:
             raise ExternalSolverFailure("natural coordinates", f"{m} unknowns are not confined")
-        self.degree = max(self.degree, found.degree)
-        for middle, radii in zip(found.middles, found.radii, strict=True):
+        self.degree = max(self.degree, enclosed.degree)
+        for middle, radii in zip(enclosed.middles, enclosed.radii, strict=True):
             if not is_excluded(matrices, errors, middle, radii):
                 boxes.append(SolutionBox(*(enclose_unique(matrices, errors, middle, radii) or (middle, radii))))
-        return boxes
+        return boxes, enclosed.others
 
 
 def expand(table: Array, m: int) -> Array:
@@ -104,35 +131,37 @@ def _is_contradictory(reduced: Reduction) -> bool:
     return bool(np.any(np.abs(reduced.table[:, 0]) > others + reduced.errors))
 
 
-def _find_cases(reduced: Reduction) -> list[tuple[int, float, float]] | None:
-    """Return the values of an unknown, by its number from 1, and their errors, by an equation without others; None
-    without one."""
+def _find_cases(reduced: Reduction) -> list[tuple[int, float | complex, float]] | None:
+    """Return the values of an unknown, by its number from 1, and errors of real ones, by an equation without others;
+    None without one."""
     m = len(reduced.farthest)
     i, j = np.triu_indices(m + 1)
     for k in range(1, m + 1):
-        own = np.isin(i, (0, k)) & np.isin(j, (0, k))
-        U, s, _ = np.linalg.svd(reduced.table[:, ~own])
-        weights = U[:, int(np.sum(s > OTHER_TERMS_MAX)) :].T
+        alone = np.isin(i, (0, k)) & np.isin(j, (0, k))
+        U, s, _ = np.linalg.svd(reduced.table[:, ~alone])
+        weights = U[:, int(np.sum(s > OTHER_TERMS_MAX)) :].conj().T
         rows = weights @ reduced.table
         if not len(rows):
             continue
-        best = int(np.argmax(np.abs(rows[:, own][:, 2])))
-        c, b, a = rows[best, own]
+        best = int(np.argmax(np.abs(rows[:, alone][:, 2])))
+        c, b, a = rows[best, alone].tolist()
         if abs(a) < LEADING_MIN:
             continue
-        off = np.abs(weights[best]) @ reduced.errors + np.abs(rows[best, ~own]) @ reduced.sizes[~own]
+        off = np.abs(weights[best]) @ reduced.errors + np.abs(rows[best, ~alone]) @ reduced.sizes[~alone]
         return [(k, value, error) for value, error in enclose_square_roots(b / a, c / a, float(off / abs(a)))]
     return None
 
 
-def enclose_square_roots(b: float, c: float, off: float) -> list[tuple[float, float]]:
-    """Return middles and radii of intervals that hold all real y at which |y² + b y + c| is at most ``off``."""
-    off = off + ROOT_ROUNDING * (1.0 + b * b + abs(c))
-    middle, square = -b / 2, b * b / 4 - c
-    if square < -off:
-        return []
+def enclose_square_roots(b: float | complex, c: float | complex, off: float) -> list[tuple[float | complex, float]]:
+    """Return middles and radii of intervals that hold all real y at which |y² + b y + c| is at most ``off``; where both
+    roots are complex these, as complex numbers."""
+    off = off + ROOT_ROUNDING * (1.0 + abs(b * b) + abs(c))
+    square = b * b / 4 - c
+    if isinstance(square, complex) or square < -off:
+        half = cmath.sqrt(square)
+        return [(-b / 2 + half, off), (-b / 2 - half, off)]
     if square <= 4 * off:
-        return [(middle, float(np.sqrt(square + off)))]
+        return [(-b / 2, math.sqrt(max(square, 0.0) + off))]
     # the farther of the two factors y − r is at least half of their difference
-    half = float(np.sqrt(square))
-    return [(middle + half, off / half), (middle - half, off / half)]
+    root = math.sqrt(square)
+    return [(-b / 2 + root, off / root), (-b / 2 - root, off / root)]

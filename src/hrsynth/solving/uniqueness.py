@@ -11,11 +11,13 @@ from __future__ import annotations
 import numpy as np
 
 from ..geometry.vectors import Array
-from ..tolerances import AFFINE_ROUNDING
+from .linear_elimination import bound_rounding
 
 REFINEMENTS_COUNT = 12
 """Newton's steps to the middle, and steps of the bound."""
-BOX_PADDING = 1e-12
+SLOPE_ERROR_MAX = 4.0
+"""Error of an equation's slopes, over that of its value."""
+BOX_PADDING_FRACTION = 1e-12
 """By how much a box is widened before it is shrunk, relative to 1 plus the unknown."""
 
 
@@ -39,25 +41,25 @@ def enclose_unique(matrices: Array, errors: Array, middle: Array, radii: Array) 
         value, J = evaluate_quadrics(matrices, x)
         step = np.linalg.lstsq(J, value, rcond=None)[0]
         x = x - step
-        if np.abs(step).max(initial=0.0) < AFFINE_ROUNDING:
+        if np.abs(step).max(initial=0.0) < BOX_PADDING_FRACTION:
             break
     value, J = evaluate_quadrics(matrices, x)
     C, magnitudes = np.linalg.pinv(J), np.abs(matrices)
-    extent = np.append(1.0, np.abs(x))
-    rounding = AFFINE_ROUNDING * (magnitudes @ extent @ extent)
-    left = np.abs(C) @ (np.abs(value) + errors + rounding)
-    at_middle = np.abs(np.eye(n) - C @ J) + AFFINE_ROUNDING * (np.abs(C) @ (2 * magnitudes @ extent)[:, 1:])
+    extent, rounding = np.append(1.0, np.abs(x)), bound_rounding(max(magnitudes.shape))
+    left = np.abs(C) @ (np.abs(value) + errors + rounding * (magnitudes @ extent @ extent))
+    at_middle = np.abs(np.eye(n) - C @ J) + rounding * (1.0 + np.abs(C) @ (2 * magnitudes @ extent)[:, 1:])
+    at_middle += (np.abs(C) @ (SLOPE_ERROR_MAX * errors))[:, None]
     bends = np.tensordot(np.abs(C), 2 * magnitudes[:, 1:, 1:], axes=1)
-    r = radii + np.abs(x - middle) + BOX_PADDING * (1 + np.abs(x))
+    r = radii + np.abs(x - middle) + BOX_PADDING_FRACTION * (1 + np.abs(x))
 
     def spread(r: Array) -> Array:
         """Bounds of |1 − C J| r for all J in the box of these radii."""
-        return np.asarray((at_middle + bends @ r) @ r * (1 + AFFINE_ROUNDING))
+        return np.asarray((at_middle + bends @ r) @ r * (1 + BOX_PADDING_FRACTION * len(matrices)))
 
     if not np.all(spread(r) < r):
         return None
     for _ in range(REFINEMENTS_COUNT):
-        r = np.minimum(r, spread(r) + left * (1 + AFFINE_ROUNDING))
+        r = np.minimum(r, (spread(r) + left) * (1 + BOX_PADDING_FRACTION * len(matrices)))
     return x, r
 
 
@@ -73,4 +75,5 @@ def is_excluded(matrices: Array, errors: Array, middle: Array, radii: Array) -> 
     value, J = evaluate_quadrics(matrices, middle)
     magnitudes, extent = np.abs(matrices), np.append(1.0, np.abs(middle))
     spread = np.abs(J) @ radii + magnitudes[:, 1:, 1:] @ radii @ radii
-    return bool(np.any(np.abs(value) > errors + spread + AFFINE_ROUNDING * (magnitudes @ extent @ extent)))
+    rounding = bound_rounding(max(magnitudes.shape)) * (magnitudes @ extent @ extent)
+    return bool(np.any(np.abs(value) > errors + spread * (1 + BOX_PADDING_FRACTION * len(matrices)) + rounding))

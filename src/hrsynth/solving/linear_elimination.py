@@ -9,11 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import qr
+from numpy.typing import NDArray
 
 from ..geometry.vectors import Array
 from ..results import Value
-from ..tolerances import AFFINE_ROUNDING
 
 COMBINATION_MIN = 1e-7
 """Smallest singular value, over the largest, of equations that are used: an error is divided by it."""
@@ -72,73 +71,85 @@ def eliminate_linear(matrices: Array, errors: Array, farthest: Array) -> Reducti
     """
     n = matrices.shape[1] - 1
     T, slack, reach, magnitudes = np.eye(n + 1), np.zeros(n), farthest, np.abs(matrices)
+    rounding = bound_rounding(2 * n)
     while True:
         m = T.shape[1] - 1
         most, off = np.append(1.0, farthest + slack), np.append(0.0, slack)
         square, sizes = np.triu_indices(m + 1)[0] > 0, bound_terms(reach)
         summed = np.abs(T) @ np.append(1.0, reach)
         # of each equation after the substitution: what was neglected, and rounding of it and of its combinations
-        missed = errors + magnitudes @ off @ (2 * most) + AFFINE_ROUNDING * (magnitudes @ summed @ summed)
-        table = tabulate(T.T @ matrices @ T)
+        missed = errors + magnitudes @ off @ (2 * most) + rounding * (1.0 + magnitudes @ summed @ summed)
+        table = list_coefficients(T.T @ matrices @ T)
         # those that reach farthest are eliminated, so that the others stay small
-        weights = _linear_equations(table, square)
-        if not (out := _pivots((weights @ table)[:, ~square][:, 1:] * reach)):
-            independent = _independent_equations(table, missed)
-            weights = _cancelling_weights((independent @ table)[:, square]) @ independent
-            if not (out := _pivots((weights @ table)[:, ~square][:, 1:] * reach)):
-                return Reduction(T, slack, independent @ table, np.abs(independent) @ missed, reach)
+        weights = _pick_linear_equations(table, square)
+        if not (out := _choose_pivots((weights @ table)[:, ~square][:, 1:] * (1.0 + reach))):
+            independent = _pick_independent_equations(table, missed)
+            used = independent @ table
+            weights = _find_cancelling_weights(used[:, square]) @ independent
+            if not (out := _choose_pivots((weights @ table)[:, ~square][:, 1:] * (1.0 + reach))):
+                return Reduction(T, slack, used, np.abs(independent) @ missed, reach)
         kept, A = np.setdiff1d(np.arange(m), out), (weights @ table)[:, ~square][:, 1:][:, out]
-        picked = _pivots(A.T)[: len(out)]
+        picked = _choose_pivots(A.T, len(out))
         weights = np.linalg.inv(A[picked]) @ weights[picked]
         rows = weights @ table
         linear = rows[:, ~square]
-        # an eliminated unknown is minus the rest of its row, but for the equations' values and what does not cancel
-        shift, places = np.zeros((m + 1, len(kept) + 1)), 1 + np.array(out)
+        # an eliminated unknown is minus what its row has besides, but for equations' values and what does not cancel
+        shift, places = np.zeros((m + 1, len(kept) + 1), dtype=matrices.dtype), 1 + np.array(out)
         shift[0, 0] = 1.0
         shift[1 + kept, 1 + np.arange(len(kept))] = 1.0
         shift[places] = -linear[:, np.append(0, 1 + kept)]
-        rest = rows.copy()
-        rest[:, ~square] = 0.0
-        rest[:, np.flatnonzero(~square)[places]] = linear[:, places] - np.eye(len(out))
+        remainder = rows.copy()
+        remainder[:, ~square] = 0.0
+        remainder[:, np.flatnonzero(~square)[places]] = linear[:, places] - np.eye(len(out))
         moved = T[1:, places]
-        slack = slack + np.abs(moved @ weights) @ missed + np.abs(moved @ rest) @ sizes
-        reach, T = reach[kept], T @ shift
+        slack = slack + np.abs(moved @ weights) @ missed + np.abs(moved @ remainder) @ sizes
+        summing = np.abs(weights) @ (missed + np.abs(table) @ sizes)
+        reach = reach[kept]
+        slack += rounding * (np.abs(moved) @ summing + np.abs(T[1:]) @ np.abs(shift) @ np.append(1.0, reach))
+        T = T @ shift
 
 
-def tabulate(matrices: Array) -> Array:
+def bound_rounding(count: int) -> float:
+    """Return a bound of the relative error of sums of so many products, and of sixteen roundings more."""
+    return float((count + 16) * np.finfo(float).eps)
+
+
+def list_coefficients(matrices: Array) -> Array:
     """Return coefficients (N, terms) of symmetric matrices (N, m + 1, m + 1), the upper triangle row by row."""
     m = matrices.shape[-1]
     upper = np.triu_indices(m)
     return np.asarray((matrices * (2 - np.eye(m)))[:, upper[0], upper[1]])
 
 
-def _linear_equations(table: Array, square: Array) -> Array:
+def _pick_linear_equations(table: Array, square: NDArray[np.bool_]) -> Array:
     """Return weights (k, N) that pick the equations that are linear as they stand."""
     quadratic = np.abs(table[:, square]).max(axis=1, initial=0.0)
     linear = np.abs(table[:, ~square][:, 1:]).max(axis=1, initial=0.0)
     return np.eye(len(table))[(linear > LINEAR_MIN) & (quadratic <= CANCELLED_MAX * linear)]
 
 
-def _independent_equations(table: Array, missed: Array) -> Array:
+def _pick_independent_equations(table: Array, missed: Array) -> Array:
     """Return weights (k, N) that pick independent equations, those with the least errors first, at length one."""
-    chosen = _pivots((table * (missed.min() / missed)[:, None]).T)
+    chosen = _choose_pivots((table * (missed.min() / missed)[:, None]).T)
     weights = np.zeros((len(chosen), len(table)))
     weights[np.arange(len(chosen)), chosen] = 1.0 / np.linalg.norm(table[chosen], axis=1)
     return weights
 
 
-def _cancelling_weights(squares: Array) -> Array:
+def _find_cancelling_weights(squares: Array) -> Array:
     """Return weights (k, N) of combinations whose quadratic parts cancel."""
     if not squares.size:
         return np.eye(len(squares))
     U, s, _ = np.linalg.svd(squares)
-    return np.asarray(U[:, int(np.sum(s > CANCELLED_MAX)) :].T)
+    return np.asarray(U[:, int(np.sum(s > CANCELLED_MAX)) :].conj().T)
 
 
-def _pivots(matrix: Array) -> list[int]:
-    """Return independent columns of a matrix, the most independent first."""
+def _choose_pivots(matrix: Array, count: int | None = None) -> list[int]:
+    """Return independent columns of a matrix, the most independent first; ``count`` if it is given."""
     if not matrix.size:
         return []
+    from scipy.linalg import qr
+
     R, order = qr(matrix, pivoting=True, mode="r")
     sizes = np.abs(np.diag(R))
-    return [int(k) for k in order[: int(np.sum(sizes > LINEAR_MIN * max(1.0, sizes[0])))]]
+    return [int(k) for k in order[: count or int(np.sum(sizes > LINEAR_MIN * max(1.0, sizes[0])))]]
