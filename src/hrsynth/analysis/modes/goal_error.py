@@ -7,7 +7,8 @@ import numpy as np
 from ...geometry.ranks import compute_range_basis
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.tasks import Task, stack_task
+from ...kinematics.pinocchio_model import PinocchioModel
+from ...kinematics.tasks import FixedValuesTask, Task, stack_task
 from ...tolerances import CHAIN_ROUNDING, MOVED_AXIS_LEVER_MAX
 
 ROTATION_LEVER_MIN = 2.0
@@ -21,12 +22,10 @@ def drift(goal: ClosedConfiguration, pose: Task | None = None, moved: float = 0.
     Newton and Kantorovich: with σ the smallest singular value of the rows J that count and L a Lipschitz constant of J,
     L ‖F‖ ≤ σ²/2 gives an exact goal within 2 ‖J⁺ F‖. Rows that depend on the others are taken as consistent.
     """
-    model = goal.model
+    model, extent = goal.model, _measure_extent(goal.model)
     F, J = stack_task(model, goal.q, pose)
     links = tuple(model.mechanism.links)
-    mechanism, V = model.mechanism, model.frames(goal.q, links)[1]
-    points = [*(mechanism.links[link].pose[:3, 3] for link in links), *(j.point for j in mechanism.joints.values())]
-    extent = 1.0 + float(np.ptp(np.array(points), axis=0).max()) / model.length
+    V = model.frames(goal.q, links)[1]
     miss = float(np.linalg.norm(F)) + CHAIN_ROUNDING * extent + MOVED_AXIS_LEVER_MAX * moved / model.length
     if not len(J):
         return model.length * miss
@@ -40,6 +39,24 @@ def drift(goal: ClosedConfiguration, pose: Task | None = None, moved: float = 0.
         float(np.linalg.norm(moved[:3], 2) + _lever(goal, link) * np.linalg.norm(moved[3:], 2))
         for link, moved in zip(links, V @ inverse, strict=True)
     )
+
+
+def is_proved_to_exist(at: ClosedConfiguration, held: FixedValuesTask, moved: float) -> bool:
+    """Return True if an exact closed configuration with held values is proved near one: as :func:`drift`, with all rows
+    independent but those that a unit vector repeats."""
+    model = at.model
+    F, J = stack_task(model, at.q, held)
+    rank = len(model.jacobian(at.q)) + sum(observation.rank for observation, _ in held.measured)
+    values, extent = np.linalg.svd(J, compute_uv=False), _measure_extent(model)
+    miss = float(np.linalg.norm(F)) + CHAIN_ROUNDING * extent + MOVED_AXIS_LEVER_MAX * moved / model.length
+    return 0 < rank <= len(values) and bool(model.nv * extent * miss <= values[rank - 1] ** 2 / 2)
+
+
+def _measure_extent(model: PinocchioModel) -> float:
+    """Return 1 plus the robot's extent (characteristic lengths)."""
+    mechanism = model.mechanism
+    points = [*(link.pose[:3, 3] for link in mechanism.links.values()), *(j.point for j in mechanism.joints.values())]
+    return 1.0 + float(np.ptp(np.array(points), axis=0).max()) / model.length
 
 
 def _lever(goal: ClosedConfiguration, link: str) -> float:

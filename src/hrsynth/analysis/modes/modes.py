@@ -38,7 +38,7 @@ from .carrying_leg_system import CarriedPlatform
 from .formation_modes import formation_modes
 from .goal_error import drift
 from .methods import better_ways, solve_tips, without_couplings
-from .natural_modes import NaturalPlatform, solve_natural
+from .natural_modes import NaturalPlatform, prove_existence, solve_natural
 from .near import NearMode, measurement_bound, near_modes, poses_alike
 from .planar_loops import PlanarLoops
 from .planar_modes import solve_loops
@@ -592,6 +592,8 @@ def _modes_by_system(
     at_goal = min(found.modes, key=reader.away, default=None)
     ordered = sorted(found.modes, key=lambda mode: mode is not at_goal)
     read = [reader.read(mode, mode is at_goal) for mode in ordered]
+    if isinstance(made.system, NaturalPlatform) and found.enclosed:
+        read = [prove_existence(mode, goal, measured.observation_model, setup.normal.moved) for mode in read]
     near = [reader.read(mode, False) for mode in found.near if reader.away(mode) > NEAR_POSE_DIFFERENCE_TOL]
     return AssemblyModes(
         setup,

@@ -8,21 +8,26 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...constraints.pattern import list_leg_ends
-from ...equations.natural_view import NaturalView, read_natural_view
-from ...errors import ExternalSolverFailure, UnsupportedLocus
+from ...constraints.pattern import list_placing_links
+from ...equations.natural_view import SLIDE_REACH_MAX, NaturalView, read_natural_view
+from ...errors import ExternalSolverFailure, LoopClosureFailure, UnsupportedLocus
 from ...geometry.vectors import Array, build_pose, compare_poses, freeze_array
+from ...kinematics.assembly import build_from_link_poses
 from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.tasks import FixedValuesTask
+from ...kinematics.velocity_relation import ObservationModel
 from ...mechanism.observations.encoder import Encoder
 from ...solving.quadric_solver import QuadricSolver, SolutionBox
 from ...solving.uniqueness import enclose_unique, evaluate_quadrics, is_excluded
 from ..measured import MeasuredRobot
+from .assembly_mode import AssemblyMode
 from .branches import Model
 from .constrained_platform import System
+from .goal_error import is_proved_to_exist
 from .solve import SystemMode, SystemModes
 
-LEG_FREEDOMS_MIN = 6
-"""Least freedoms of a leg that holds nothing of the platform."""
+LEG_DOF_MIN = 6
+"""Least dof of a leg that holds nothing of the platform."""
 SAME_POSE_TOL = 1e-6
 """Difference (characteristic lengths, entries of rotations) up to which poses are listed as one."""
 ROTATION_SPREAD_MAX = 1e-8
@@ -58,22 +63,40 @@ class NaturalPlatform(System):
             basis, images = (np.column_stack([M, np.cross(*M.T)]) for M in (basis, images))
         U, _, Vt = np.linalg.svd(images @ basis.T)
         R = U @ Vt
-        there = self.view.point(link, origin) @ values
-        moved = build_pose(self.size * (there - R @ origin), R)
+        place = self.view.point(link, origin) @ values
+        moved = build_pose(self.size * (place - R @ origin), R)
         return np.asarray(moved @ self.goal.pose(link))
 
     def place_all(self, x: Array) -> dict[str, Array]:
-        """Return the poses (4, 4) of the links on which legs end."""
+        """Return the poses (4, 4) of the links that place the platform."""
         return {link: self.place(link, x) for link in self.links}
+
+    def compare(self, x: Array, y: Array) -> float:
+        """Return the largest difference of poses at x and y (characteristic lengths, entries of rotations)."""
+        pairs = zip(self.place_all(x).values(), self.place_all(y).values(), strict=True)
+        return max(compare_poses(X, Y, self.size) for X, Y in pairs)
+
+    def count_poses(self, points: Sequence[Array]) -> int:
+        """Return the number of distinct poses at points x (n,), complex ones too."""
+        rows = [self.view.point(link, self.view.links[link][1]) for link in self.links]
+        for link in self.links:
+            rows += [self.view.direction(link, column) for column in self.view.groups[self.view.links[link][0]][0].T]
+        distinct = list[Array]()
+        for x in points:
+            pose = np.concatenate(rows) @ np.append(1.0, x)
+            size = 1.0 + np.abs(pose).max()
+            if all(np.abs(pose - known).max() > SAME_POSE_TOL * size for known in distinct):
+                distinct.append(pose)
+        return len(distinct)
 
     def bound_shift(self, radii: Array) -> tuple[float, float]:
         """Return how far (m) and by which angle (rad) a link's pose can be from that at the middle of a box."""
         shift = turn = 0.0
         for link in self.links:
-            group, origin, own = self.view.links[link]
+            group, origin, triple = self.view.links[link]
             places = self.view.groups[group][1]
             turned = 0.0 if places is None else float(np.linalg.norm(radii[places]))
-            moved = 0.0 if own is None else float(np.linalg.norm(radii[own]))
+            moved = 0.0 if triple is None else float(np.linalg.norm(radii[triple]))
             arm = float(np.linalg.norm(self.goal.pose(link)[:3, 3] / self.size - origin))
             # images to the nearest rotation: twice; a third one of two: twice
             turn = max(turn, 4.0 * turned)
@@ -104,38 +127,40 @@ def _read(measured: MeasuredRobot, goal: ClosedConfiguration, error: float, kept
     mechanism, name = goal.model.mechanism, setup.robot.name
     if setup.decomposition.point is not None or model.reference != mechanism.base:
         raise UnsupportedLocus(name, "its platform is a point, or seen from a link that is not its base")
-    seen = {each.joint for each in model.observations if isinstance(each, Encoder)}
-    links = {each.link for each in model.observations}
-    idle = [
+    joints = {seen.joint for seen in model.observations if isinstance(seen, Encoder)}
+    links = {seen.link for seen in model.observations}
+    free_legs = [
         leg
         for leg in setup.decomposition.legs
-        if not seen & {*leg.joints}
+        if not joints & {*leg.joints}
         and not links & {*leg.links}
-        and sum(mechanism.joints[joint].type.freedoms for joint in leg.joints) >= LEG_FREEDOMS_MIN
+        and sum(mechanism.joints[joint].type.freedoms for joint in leg.joints) >= LEG_DOF_MIN
     ]
-    idle_joints = {joint for leg in idle for joint in leg.joints}
-    resting = _list_resting_directions(measured, goal, idle_joints) if kept else []
-    view = read_natural_view(goal, model.observations, idle_joints, resting, error)
-    bodies = list_leg_ends(setup.decomposition)
+    left_out = {joint for leg in free_legs for joint in leg.joints}
+    directions = _list_kept_directions(measured, goal, left_out) if kept else []
+    view = read_natural_view(goal, model.observations, left_out, directions, error)
+    bodies = list_placing_links(setup.decomposition)
     for link in bodies:
         if link not in view.links or view.groups[view.links[link][0]][0].shape[1] < 2:
             raise UnsupportedLocus(name, f"the joints do not place {link}")
     return NaturalPlatform((), np.zeros((0, 3)), goal, view, bodies, kept, error=error)
 
 
-def _list_resting_directions(
-    measured: MeasuredRobot, goal: ClosedConfiguration, idle: set[str]
+def _list_kept_directions(
+    measured: MeasuredRobot, goal: ClosedConfiguration, free_legs: set[str]
 ) -> list[tuple[str, Array]]:
     """Return links and directions (3,), at the goal, that no sample turns."""
-    mechanism, found = goal.model.mechanism, list[tuple[str, Array]]()
+    mechanism, kept = goal.model.mechanism, list[tuple[str, Array]]()
     for link in mechanism.links:
-        if link == mechanism.base or not any(link in j.links for j in mechanism.joints.values() if j.name not in idle):
+        if link == mechanism.base or not any(
+            link in j.links for j in mechanism.joints.values() if j.name not in free_legs
+        ):
             continue
         R = goal.pose(link)[:3, :3]
         turns = [member.configuration.pose(link)[:3, :3] @ R.T - np.eye(3) for member in measured.samples.members]
         _, s, Vt = np.linalg.svd(np.vstack(turns))
-        found += [(link, Vt[k]) for k in range(3) if s[k] < ROTATION_SPREAD_MAX]
-    return found
+        kept += [(link, Vt[k]) for k in range(3) if s[k] < ROTATION_SPREAD_MAX]
+    return kept
 
 
 def _solve(system: NaturalPlatform) -> tuple[Model, SystemModes]:
@@ -143,13 +168,12 @@ def _solve(system: NaturalPlatform) -> tuple[Model, SystemModes]:
     view, solver = system.view, QuadricSolver()
     if not _is_isolated(view):
         raise ExternalSolverFailure("natural coordinates", "the goal is not isolated, to rounding")
-    boxes = solver.solve(view.matrices, view.errors, view.farthest)
+    boxes, others = solver.solve(view.matrices, view.errors, view.farthest)
     n, m = len(view.goal), solver.left
-    modes = list[SystemMode]()
-    for x, radii in _list_unique(view, boxes):
+    modes, unique = list[SystemMode](), _list_unique(view, boxes)
+    for x, radii in unique:
         shift, turn = system.bound_shift(radii)
-        pose = system.place(system.links[0], x)
-        same = next((k for k, e in enumerate(modes) if compare_poses(e.pose, pose, system.size) < SAME_POSE_TOL), None)
+        close = [k for k, mode in enumerate(modes) if system.compare(mode.q, x) < SAME_POSE_TOL]
         at_goal = bool(np.all(np.abs(view.goal - x) <= radii))
         mode = SystemMode(
             (),
@@ -157,34 +181,36 @@ def _solve(system: NaturalPlatform) -> tuple[Model, SystemModes]:
             shift,
             turn,
             float(np.abs(evaluate_quadrics(view.matrices, x)[0]).max(initial=0.0)),
-            freeze_array(pose),
+            freeze_array(system.place(system.links[0], x)),
             freeze_array(x),
             proved=at_goal,
             match_residual=not at_goal,
         )
-        if same is None:
+        if not close:
             modes.append(mode)
         else:  # legs that are assembled in several ways: not known to be one pose
-            first = modes[same] if not at_goal else mode
-            modes[same] = replace(
+            first, apart = mode if at_goal else modes[close[0]], system.compare(modes[close[0]].q, x)
+            modes[close[0]] = replace(
                 first,
-                radius=first.radius + SAME_POSE_TOL,
-                shift=first.shift + SAME_POSE_TOL * system.size,
-                turn=first.turn + SAME_POSE_TOL,
+                radius=max(first.radius, mode.radius) + apart,
+                shift=max(first.shift, shift) + apart * system.size,
+                turn=max(first.turn, turn) + apart,
                 proved=False,
                 match_residual=True,
             )
     if not any(np.all(np.abs(view.goal - mode.q) <= SAME_POSE_TOL) for mode in modes):
         raise ExternalSolverFailure("natural coordinates", "the goal is in none of the boxes")
+    count = system.count_poses([*(mode.q for mode in modes), *others])
     proof = (
-        f"{n} coordinates of points and directions, {m} of them left by linear equations: all real solutions are in "
-        f"{len(boxes)} box{'es' * (len(boxes) != 1)}"
-        + (f" of {solver.cases} cases" if solver.cases > 1 else "")
-        + (f", by combinations of the equations up to degree {solver.degree}" if solver.degree else "")
-        + f", with errors bounded; {len(modes)} pose{'s' * (len(modes) != 1)}"
+        f"{n} coordinates of points and directions, {m} of them left by linear equations: all real solutions"
+        + f" within {SLIDE_REACH_MAX:g} characteristic lengths" * bool(np.any(view.farthest >= SLIDE_REACH_MAX))
+        + f" are in {len(boxes)} box{'es' * (len(boxes) != 1)}"
+        + f" of {solver.cases} cases" * (solver.cases > 1)
+        + f", by combinations of the equations up to degree {solver.degree}" * bool(solver.degree)
+        + f", with errors bounded; {len(modes)} pose{'s' * (len(modes) != 1)}; complex ones are found, {count} in all"
     )
-    found = SystemModes(None, tuple(modes), True, proof, bound="combinations", enclosed=True)
-    return Model(system, system.place_all, view.goal), found
+    listed = SystemModes(count, tuple(modes), True, proof, bound="combinations", enclosed=len(modes) == len(unique))
+    return Model(system, system.place_all, view.goal), listed
 
 
 def _is_isolated(view: NaturalView) -> bool:
@@ -196,13 +222,29 @@ def _is_isolated(view: NaturalView) -> bool:
 def _list_unique(view: NaturalView, boxes: Sequence[SolutionBox]) -> list[tuple[Array, Array]]:
     """Return middles and radii of boxes that hold one solution at most, without those that hold none; raises
     ``ExternalSolverFailure``."""
-    found = list[tuple[Array, Array]]()
+    unique = list[tuple[Array, Array]]()
     for box in boxes:
         if is_excluded(view.matrices, view.errors, box.middle, box.radii):
             continue
-        one = enclose_unique(view.matrices, view.errors, box.middle, box.radii)
-        if one is None:
+        smaller = enclose_unique(view.matrices, view.errors, box.middle, box.radii)
+        if smaller is None:
             raise ExternalSolverFailure("natural coordinates", "a box may hold several solutions")
-        if not is_excluded(view.matrices, view.errors, *one):
-            found.append(one)
-    return found
+        if not is_excluded(view.matrices, view.errors, *smaller):
+            unique.append(smaller)
+    return unique
+
+
+def prove_existence(
+    mode: AssemblyMode, goal: ClosedConfiguration, observation_model: ObservationModel, moved: float
+) -> AssemblyMode:
+    """Return a mode of a box with one solution at most, as proved where the assembled robot proves one; ``moved``: how
+    far axes are from those of the file (m)."""
+    at = mode.configuration
+    if mode.goal or at is None or mode.match_residual is None:
+        return mode
+    try:
+        at = at if at.model is goal.model else build_from_link_poses(goal.model, at.pose)
+    except LoopClosureFailure:
+        return mode
+    held = FixedValuesTask.at(goal.model, goal.q, observation_model.reference, observation_model.observations)
+    return replace(mode, proved=True, match_residual=None) if is_proved_to_exist(at, held, moved) else mode

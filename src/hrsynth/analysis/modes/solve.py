@@ -97,10 +97,11 @@ class SystemModes(Value):
     """All modes: ``complex`` solutions counted with multiplicity (None if not known), the real ones as ``modes``, and
     the proof as text.
 
-    With redundant observation, ``complex`` counts only the modes. ``complete`` is True only if every complex solution
-    is isolated and every real one enclosed. ``near`` are poses that match almost (with redundant observation only);
-    ``bound`` names the root bound: ``resultant``, ``class`` (the degrees of such systems), ``rank`` (of multiples of
-    the equations) or ``none``, if a solver's count is trusted; ``enclosed``: each counted solution has its enclosure;
+    With redundant observation, ``complex`` counts only the modes. ``complete`` is True only if every real solution is
+    in one of the enclosures; every complex one is isolated then too, except for ``combinations``. ``near`` are
+    poses that match almost (with redundant observation only); ``bound`` names the root bound: ``resultant``, ``class``
+    (the degrees of such systems), ``rank`` (of multiples of the equations), ``combinations`` (of the equations, for
+    real solutions) or ``none``, if a solver's count is trusted; ``enclosed``: each counted solution has its enclosure;
     ``singular_solutions`` describes a special input: a continuous family, of dimension ``continuous_family``, a
     singular pose, tips on one line.
     """

@@ -1,0 +1,159 @@
+"""Lists of modes in natural coordinates: those of the other ways, and robots that no other way lists."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hrsynth
+from adversary.kinds import KINDS
+from analysis.modes.ankles import ankle
+from analysis.modes.closings import closings
+from analysis.modes.test_planar_loops import LINKS, STEPHENSON, linkage
+from hrsynth.analysis.measured import MeasuredRobot
+from hrsynth.analysis.modes.branches import Model
+from hrsynth.analysis.modes.goal_error import drift
+from hrsynth.analysis.modes.modes import AssemblyModes
+from hrsynth.analysis.modes.natural_modes import solve_natural
+from hrsynth.analysis.modes.solve import SystemModes
+from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.errors import ExternalSolverFailure, UnsupportedLocus
+from hrsynth.geometry.vectors import Array, compare_poses
+from hrsynth.mechanism import Mechanism
+from kinematics.robots import ROBOTS
+from strategies import planar, pods
+
+SAME = 1e-6
+"""Difference up to which two poses are one."""
+TOO_LARGE = {"3rps", "6pus", "gough_stewart", "hexa", "hexaglide"}
+"""Shipped robots whose real modes are not confined: six unknowns with 16 to 40 solutions."""
+FAMILIES = {"3ppr_m1", "3ppr_m2", "3prp", "3rrp", "hexaglide", "i4l", "prrrp_parallel", "uranesx"}
+"""Shipped robots whose hidden modes are families."""
+
+
+def solve(robot: Mechanism, real: bool) -> tuple[Model, SystemModes]:
+    """The list in natural coordinates."""
+    setup = ObservedRobot.of(robot, driven=real)
+    goal = setup.all_samples.start
+    return solve_natural(MeasuredRobot.of(setup, real), goal, drift(goal, None, setup.normal.moved))
+
+
+def poses_of(made: Model, found: SystemModes) -> list[Array]:
+    """Poses (4, 4) of the first link on which legs end."""
+    return [next(iter(made.bodies(mode.q).values())) for mode in found.modes]
+
+
+def compare(robot: Mechanism, real: bool) -> None:
+    """Check that both lists have the same poses and as many complex ones. Poses that the robot is not assembled at are
+    in the other lists alone, poses of other operation modes in this one alone."""
+    listed, (made, found) = hrsynth.modes(robot, real=real, cone=0), solve(robot, real)
+    assert found.complete
+    assert listed.found.complete
+    body, length = next(iter(made.bodies(made.home))), listed.goal.model.length
+    own, others = poses_of(made, found), [(mode, mode.bodies[body]) for mode in listed.modes if mode.bodies]
+    for mode, X in others:
+        near = min(compare_poses(X, each, length) for each in own) < SAME
+        assert near == (mode.reachable is not False and mode.configuration is not None)
+    for X in own:
+        turned = np.abs(X[:3, :3] - listed.goal.pose(body)[:3, :3]).max() > 1.0
+        assert turned or min(compare_poses(X, each, length) for _, each in others) < SAME
+    if len(own) == len(others):
+        assert found.complex == listed.found.complex
+
+
+@pytest.mark.some(3)
+@pytest.mark.parametrize("real", [False, True])
+@pytest.mark.parametrize("name", [name for name in ROBOTS if not name.endswith("point")])
+def test_shipped_robots_have_the_same_lists(name: str, real: bool):
+    if name in (TOO_LARGE if real else FAMILIES):
+        with pytest.raises(ExternalSolverFailure, match="not confined" if real else "not isolated"):
+            solve(hrsynth.load(name), real)
+    else:
+        compare(hrsynth.load(name), real)
+
+
+@pytest.mark.some(2)
+@pytest.mark.parametrize("seed", range(4))
+def test_random_robots_have_the_same_lists(seed: int):
+    rng = np.random.default_rng(seed)
+    for words in (("RRR", "RRR", "RRR"), ("RPR", "RRR", "PRR"), ("PRR", "PRR", "RPR")):
+        robot = planar(words, rng, [(0,)] * 3)
+        compare(robot, real=False)
+        compare(robot, real=True)
+        assert solve(robot, real=True)[1].enclosed
+    compare(pods(("UPS",) * 6, rng), real=False)
+    for kind in ("SPU", "RSU", "RUS"):
+        compare(ankle(kind, seed, offset=0.05)[0], real=True)
+
+
+@pytest.mark.parametrize(
+    ("motor", "platform", "count"), [("j0", "coupler", 2), ("j6", "coupler", 6), ("j3", "coupler", 2), ("j0", "c", 4)]
+)
+def test_six_bars_of_two_loops(motor: str, platform: str, count: int):
+    """Stephenson's: a coupler curve meets a circle in six."""
+    assert solve(linkage(STEPHENSON, LINKS, platform, motor), real=True)[1].complex == count
+
+
+def draw(kind: str, seed: int, folder: Path) -> Mechanism:
+    """A robot of one of the adversary's kinds, as it is read from a file."""
+    path = folder / f"{kind}.urdf"
+    path.write_text(KINDS[kind](np.random.default_rng(seed)).text(), encoding="utf-8")
+    return hrsynth.load(path)
+
+
+def count_others(listed: AssemblyModes, starts: int) -> int:
+    """The number of random closings; none ends at a pose of the platform that is not listed."""
+    found, link = closings(listed, starts), listed.setup.motion.link
+    for at in found:
+        apart = [compare_poses(at.pose(link), m.bodies[link], at.model.length) for m in listed.modes if m.bodies]
+        assert min(apart) < SAME
+    return len(found)
+
+
+@pytest.mark.some(2, 4)
+@pytest.mark.parametrize("seed", [0, 1, 2, 3, 6, 7])
+def test_four_ruu_robots_have_one_mode(seed: int, tmp_path: Path):
+    """Upright and tilted, of random dimensions: found by no other way."""
+    listed = hrsynth.modes(draw("schoenflies", seed, tmp_path), cone=0)
+    assert (listed.found.complete, listed.found.bound, len(listed.modes)) == (True, "combinations", 1)
+    assert listed.modes[0].goal
+    assert listed.within == "poses in space"
+    assert count_others(listed, 60) > 0
+
+
+@pytest.mark.slow
+def test_directions_that_no_sample_turns_are_kept(tmp_path: Path):
+    """A robot that translates in its operation mode; in others too many solutions are left."""
+    listed = hrsynth.modes(draw("translational", 3, tmp_path), cone=0)
+    assert (listed.found.complete, len(listed.modes)) == (True, 1)
+    assert listed.within == "poses at which links keep the directions that they keep in this operation mode"
+
+
+def test_what_is_not_known_is_refused():
+    """A goal that is not exact, a platform that is a point, a family."""
+    setup = ObservedRobot.of("3rrr_m1")
+    with pytest.raises(UnsupportedLocus, match="is not bounded"):
+        solve_natural(MeasuredRobot.of(setup), setup.all_samples.start, np.inf)
+    with pytest.raises(UnsupportedLocus, match="is a point"):
+        solve(hrsynth.load("prrrp_parallel_point"), real=True)
+    with pytest.raises(ExternalSolverFailure, match="the goal is not isolated"):
+        solve(hrsynth.load("3prp"), real=False)
+
+
+def test_an_uncertain_goal_gives_wider_boxes_or_none():
+    """Radii grow with the goal's error, and what is not proved then is refused."""
+    setup = ObservedRobot.of("3rrr_m1")
+    goal, measured = setup.all_samples.start, MeasuredRobot.of(setup)
+    radii = [max(mode.radius for mode in solve_natural(measured, goal, error)[1].modes) for error in (0.0, 1e-9)]
+    assert 10 * radii[0] < radii[1] < 1e-4
+    with pytest.raises(ExternalSolverFailure):
+        solve_natural(measured, goal, 1e-2)
+
+
+def test_the_answer_says_what_was_proved(tmp_path: Path):
+    text = str(hrsynth.modes(draw("schoenflies", 0, tmp_path), cone=0))
+    assert "1 real of 1 complex, proved to be all among poses in space" in " ".join(text.split())
+    assert "coordinates of points and directions" in text
+    assert "a mode by construction, pose not proved, known to" in text
