@@ -126,9 +126,11 @@ def expand(table: Array, m: int) -> Array:
 
 
 def _is_contradictory(reduced: Reduction) -> bool:
-    """Return True if an equation's value cannot be as small as its error."""
-    others = np.abs(reduced.table[:, 1:]) @ reduced.sizes[1:]
-    return bool(np.any(np.abs(reduced.table[:, 0]) > others + reduced.errors))
+    """Return True if an equation's value cannot be as small as its error; complex solutions have no bounds."""
+    others = np.abs(reduced.table[:, 1:])
+    if np.iscomplexobj(reduced.table):
+        return bool(np.any(others.max(axis=1, initial=0.0) < OTHER_TERMS_MAX * np.abs(reduced.table[:, 0])))
+    return bool(np.any(np.abs(reduced.table[:, 0]) > others @ reduced.sizes[1:] + reduced.errors))
 
 
 def _find_cases(reduced: Reduction) -> list[tuple[int, float | complex, float]] | None:

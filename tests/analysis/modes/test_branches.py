@@ -117,12 +117,16 @@ def check_driven(drive: str, seed: int, starts: int) -> None:
 
 
 def test_a_list_is_not_called_all_where_a_leg_is_not_understood():
-    """A coupler on balls that is watched: its leg keeps the curve that its moves show, and the proof says why."""
+    """A coupler on balls that is watched: its leg keeps the curve that its moves show, and the proof says why. Natural
+    coordinates need no such curve."""
     robot = driven("ball rod", 2, watched="coupler")
     found = modes(robot)
-    assert not found.found.complete
-    assert found.found.bound == "none"
-    assert "coupler" in found.found.proof
+    assert found.found.complete
+    assert found.found.bound == "combinations"
+    few = modes(robot, time_limit=1.0)
+    assert not few.found.complete
+    assert few.found.bound == "none"
+    assert "coupler" in few.found.proof
 
 
 def offset_u(offset: float) -> Chain:

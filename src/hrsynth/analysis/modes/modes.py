@@ -561,12 +561,13 @@ def _modes_by_system(
     answers = list[tuple[Model, SystemModes]]()
     exact, better = drift(goal, wanted, setup.normal.moved), None
     free = without_couplings(measured, goal)
-    tips, asked = (
+    tips, asked, natural = (
         partial(solve_tips, as_written=as_written, time_limit=time_limit),
         partial(solve_posed, time_limit=time_limit),
+        partial(solve_natural, time_limit=time_limit),
     )
     first = (tips, asked, solve_loops) if free is None else (solve_loops, tips, asked)
-    for listed in (*first, solve_carried, solve_loop, solve_natural):
+    for listed in (*first, solve_carried, solve_loop, natural):
         if better is not None and listed not in better:
             continue
         if listed is not solve_loops and not setup.decomposition.is_platform_decided:

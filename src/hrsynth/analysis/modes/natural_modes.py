@@ -10,7 +10,7 @@ import numpy as np
 
 from ...constraints.pattern import list_placing_links
 from ...equations.natural_view import SLIDE_REACH_MAX, NaturalView, read_natural_view
-from ...errors import ExternalSolverFailure, LoopClosureFailure, UnsupportedLocus
+from ...errors import ExternalSolverFailure, LoopClosureFailure, TooLarge, UnsupportedLocus
 from ...geometry.vectors import Array, build_pose, compare_poses, freeze_array
 from ...kinematics.assembly import build_from_link_poses
 from ...kinematics.configuration import ClosedConfiguration
@@ -21,11 +21,13 @@ from ...solving.quadric_solver import QuadricSolver, SolutionBox
 from ...solving.uniqueness import enclose_unique, evaluate_quadrics, is_excluded
 from ..measured import MeasuredRobot
 from .assembly_mode import AssemblyMode
-from .branches import Model
+from .branches import MODES_TIME_LIMIT_S, Model
 from .constrained_platform import System
 from .goal_error import is_proved_to_exist
 from .solve import SystemMode, SystemModes
 
+NATURAL_TIME_S = 5.0
+"""Estimated time of one list (s)."""
 LEG_DOF_MIN = 6
 """Least dof of a leg that holds nothing of the platform."""
 SAME_POSE_TOL = 1e-6
@@ -104,9 +106,13 @@ class NaturalPlatform(System):
         return shift, turn
 
 
-def solve_natural(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0) -> tuple[Model, SystemModes]:
+def solve_natural(
+    measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0, *, time_limit: float = MODES_TIME_LIMIT_S
+) -> tuple[Model, SystemModes]:
     """All real modes, with the goal known to ``error`` (m); those that keep the directions that no sample turns, where
-    others cannot be confined. Raises ``UnsupportedLocus`` and ``ExternalSolverFailure``."""
+    others cannot be confined. Raises ``UnsupportedLocus``, ``ExternalSolverFailure`` and ``TooLarge``."""
+    if time_limit < NATURAL_TIME_S:
+        raise TooLarge("a system of equations", "natural coordinates", NATURAL_TIME_S, time_limit)
     if not np.isfinite(error):
         raise UnsupportedLocus(
             measured.setup.robot.name, "the distance to the exact closed configuration is not bounded"
