@@ -67,7 +67,7 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
     if found.found.complete and not found.found.solved and found.confined is not None:  # a copy: solved again
         found = modes(found.setup, at=found.goal, real=found.kind == "real", as_written=found.confined.as_written)
     if found.found.complete and found.model is not None and isinstance(found.model.system, NaturalPlatform):
-        return of_solutions(found, found.model.system, about)
+        return build_solutions_certificate(found, found.model.system, about)
     robot = ClosedRobot.of(found)
     try:
         system = None if found.model is None else found.model.system
@@ -79,7 +79,7 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
                 return _as_chain(found, about, robot, reason, other)
         if found.found.complete and not found.found.solved:
             with suppress(UnsupportedLocus):
-                return of_loops(found, about, robot)
+                return build_loops_certificate(found, about, robot)
         try:
             return of_systems(found.found, about, robot)
         except CertificateRejection as reason:
@@ -90,7 +90,9 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
         raise NoCertificate(found.setup.robot.name, str(reason)) from None
 
 
-def of_solutions(found: AssemblyModes, system: NaturalPlatform, about: Mapping[str, Any]) -> dict[str, Any]:
+def build_solutions_certificate(
+    found: AssemblyModes, system: NaturalPlatform, about: Mapping[str, Any]
+) -> dict[str, Any]:
     """The certificate of a list in natural coordinates; raises ``NoCertificate``."""
     assert found.model is not None
     goal = found.model.home
@@ -119,7 +121,9 @@ def of_systems(found: SystemModes, about: Mapping[str, Any], robot: ClosedRobot 
     )
 
 
-def of_loops(found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot | None) -> dict[str, Any]:
+def build_loops_certificate(
+    found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot | None
+) -> dict[str, Any]:
     """The certificate of the modes of a planar mechanism from its joints; raises ``CertificateRejection``,
     ``UnsupportedLocus``."""
     system = None if found.model is None else found.model.system

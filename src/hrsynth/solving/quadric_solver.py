@@ -36,8 +36,8 @@ class SolutionBox(Value):
 
 @dataclass(eq=False)
 class SolvingStep:
-    """What a case was solved by: an elimination, then cases of one unknown (by its number from 1, with the weights of
-    the equation that has it alone), or algebra."""
+    """Record of a case: an elimination, then cases of one unknown (by its number from 1, with the weights of the
+    equation that has it alone), or algebra."""
 
     reduced: Reduction
     contradictory: bool = False
