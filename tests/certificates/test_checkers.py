@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from hrsynth.certificates import verify_certificate, verify_path, verify_ranks
+from hrsynth.certificates import verify_certificate, verify_path, verify_ranks, verify_solutions
 
 
-@pytest.mark.parametrize("checker", [verify_certificate, verify_path, verify_ranks])
+@pytest.mark.parametrize("checker", [verify_certificate, verify_path, verify_ranks, verify_solutions])
 def test_a_checker_is_one_short_file_that_needs_python_alone(checker):
     text = Path(checker.__file__).read_text(encoding="utf-8")
     tree = ast.parse(text)

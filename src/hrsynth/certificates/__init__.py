@@ -17,10 +17,11 @@ from ..errors import BadRequest, InvalidCertificate, NoCertificate, PoseReachFai
 from ..mechanism import Mechanism
 from ..tolerances import RELATION_ANGLE_TOL
 from ..untrusted import run_program
-from . import modes, paths, ranks, verify_certificate, verify_path, verify_ranks
+from . import modes, paths, ranks, verify_certificate, verify_path, verify_ranks, verify_solutions
 from .verify_certificate import CertificateRejection, once, rational
 from .verify_path import PathRejection
 from .verify_ranks import RankRejection
+from .verify_solutions import SolutionsRejection
 
 VERIFY_TIMEOUT_S = 40
 """Seconds of one core after which checking a certificate file is given up."""
@@ -38,8 +39,8 @@ def certificate(found: AssemblyModes | Derivation | PathAnswer) -> dict[str, Any
     Returns
     -------
     dict
-        Content of a JSON file for ``verify``, or for one of ``verify_certificate.py``, ``verify_ranks.py`` and
-        ``verify_path.py``. Lengths are in characteristic lengths, numbers are fractions as text.
+        Content of a JSON file for ``verify``, or for one of the checkers ``verify_*.py``. Lengths are in characteristic
+        lengths, numbers are fractions as text.
 
     Raises
     ------
@@ -120,15 +121,17 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
     try:
         if not isinstance(record, dict):
             raise CertificateRejection("it is not a JSON object")
-        checkers = {"path": verify_path, "ranks": verify_ranks}
+        checkers = {"path": verify_path, "ranks": verify_ranks, "solutions": verify_solutions}
         checker = checkers.get(str(record.get("claim")), verify_certificate)
         proved = checker.verify(record) if file is None else _within_limits(Path(str(checker.__file__)), file)
-    except (CertificateRejection, PathRejection, RankRejection, BadRequest) as reason:
+    except (CertificateRejection, PathRejection, RankRejection, SolutionsRejection, BadRequest) as reason:
         raise InvalidCertificate(name, str(reason)) from None
     if robot is not None:
         robot = load(robot)
         try:
-            own = {"modes": modes, "ranks": ranks, "path": paths}[record["claim"]].again(record, robot)
+            own = {"modes": modes, "solutions": modes, "ranks": ranks, "path": paths}[record["claim"]].again(
+                record, robot
+            )
         except (BadRequest, NoCertificate, PoseReachFailure) as error:
             raise InvalidCertificate(name, f"it is not for {robot.name}: {error}") from None
         except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
@@ -149,7 +152,7 @@ def _within_limits(checker: Path, file: Path) -> str:
 def _is_same_geometry(one: Any, other: Any) -> bool:
     """Return True if two records of geometry agree; solutions are left out."""
     if isinstance(one, dict) and isinstance(other, dict):
-        left_out = {"robot", "boxes", "bound", "sha256", "stacks", "path"}
+        left_out = {"robot", "boxes", "bound", "sha256", "stacks", "path", "digits", "solutions", "proof"}
         return one.keys() - left_out == other.keys() - left_out and all(
             _is_same_geometry(one[key], other[key]) for key in one.keys() - left_out
         )

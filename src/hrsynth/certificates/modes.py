@@ -20,6 +20,7 @@ from ..analysis.modes.branches import Model
 from ..analysis.modes.carrying_leg_modes import solve_carried
 from ..analysis.modes.carrying_leg_system import CarriedPlatform
 from ..analysis.modes.modes import AssemblyModes, modes
+from ..analysis.modes.natural_modes import NaturalPlatform
 from ..analysis.modes.planar_loops import PlanarLoops
 from ..analysis.modes.planar_reading import planar_loops
 from ..analysis.modes.quadrics import WorkingFrame
@@ -31,14 +32,17 @@ from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism import Mechanism
 from ..mechanism.pose import Pose
+from . import verify_solutions
 from .bounds import bound
 from .chains import chains
 from .closures import ClosedRobot, write_numbers
 from .planar_records import closings
 from .proposed import ProposedRecord
 from .refining import Polynomial, ScaledEquations
+from .solution_records import build_record
 from .system_records import propose
 from .verify_certificate import KINDS, CertificateRejection, digest, integral, rational, told, value, verify
+from .verify_solutions import SolutionsRejection
 
 EXTRANEOUS_START_TOL = 1e-6
 """Residual of extraneous starts, and distance between two of them (both relative)."""
@@ -62,6 +66,8 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
     }
     if found.found.complete and not found.found.solved and found.confined is not None:  # a copy: solved again
         found = modes(found.setup, at=found.goal, real=found.kind == "real", as_written=found.confined.as_written)
+    if found.found.complete and found.model is not None and isinstance(found.model.system, NaturalPlatform):
+        return build_solutions_certificate(found, found.model.system, about)
     robot = ClosedRobot.of(found)
     try:
         system = None if found.model is None else found.model.system
@@ -73,7 +79,7 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
                 return _as_chain(found, about, robot, reason, other)
         if found.found.complete and not found.found.solved:
             with suppress(UnsupportedLocus):
-                return of_loops(found, about, robot)
+                return build_loops_certificate(found, about, robot)
         try:
             return of_systems(found.found, about, robot)
         except CertificateRejection as reason:
@@ -82,6 +88,22 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
             return _as_chain(found, about, robot, reason, solve_carried, solve_loop)
     except CertificateRejection as reason:
         raise NoCertificate(found.setup.robot.name, str(reason)) from None
+
+
+def build_solutions_certificate(
+    found: AssemblyModes, system: NaturalPlatform, about: Mapping[str, Any]
+) -> dict[str, Any]:
+    """The certificate of a list in natural coordinates; raises ``NoCertificate``."""
+    assert found.model is not None
+    goal = found.model.home
+    listed = sorted((mode.q for mode in found.found.modes), key=lambda x: float(np.abs(x - goal).max(initial=0.0)))
+    record = {"format": "hrsynth-certificate-1", "claim": "solutions", **about, **build_record(system, listed)}
+    record["sha256"] = digest(record)
+    try:
+        verify_solutions.verify(record)
+    except SolutionsRejection as reason:
+        raise NoCertificate(found.setup.robot.name, str(reason)) from None
+    return record
 
 
 def of_systems(found: SystemModes, about: Mapping[str, Any], robot: ClosedRobot | None = None) -> dict[str, Any]:
@@ -99,7 +121,9 @@ def of_systems(found: SystemModes, about: Mapping[str, Any], robot: ClosedRobot 
     )
 
 
-def of_loops(found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot | None) -> dict[str, Any]:
+def build_loops_certificate(
+    found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot | None
+) -> dict[str, Any]:
     """The certificate of the modes of a planar mechanism from its joints; raises ``CertificateRejection``,
     ``UnsupportedLocus``."""
     system = None if found.model is None else found.model.system

@@ -38,6 +38,11 @@ class Reduction(Value):
         Bounds (N,) of their absolute values at each exact solution.
     farthest
         Bounds (m,) of |y| at each exact solution.
+    rounds
+        Of each elimination: the unknowns, by their places among those that were left, and the weights (k, given
+        equations) of the sums that give them.
+    picks
+        Weights (N, given equations) of the equations of ``table``.
     """
 
     T: Array
@@ -45,6 +50,8 @@ class Reduction(Value):
     table: Array
     errors: Array
     farthest: Array
+    rounds: tuple[tuple[list[int], Array], ...]
+    picks: Array
 
     @property
     def sizes(self) -> Array:
@@ -71,7 +78,7 @@ def eliminate_linear(matrices: Array, errors: Array, farthest: Array) -> Reducti
     """
     n = matrices.shape[1] - 1
     T, slack, reach, magnitudes = np.eye(n + 1), np.zeros(n), farthest, np.abs(matrices)
-    rounding = bound_rounding(2 * n)
+    rounding, rounds = bound_rounding(2 * n), list[tuple[list[int], Array]]()
     while True:
         m = T.shape[1] - 1
         most, off = np.append(1.0, farthest + slack), np.append(0.0, slack)
@@ -87,10 +94,11 @@ def eliminate_linear(matrices: Array, errors: Array, farthest: Array) -> Reducti
             used = independent @ table
             weights = _find_cancelling_weights(used[:, square]) @ independent
             if not (out := _choose_pivots((weights @ table)[:, ~square][:, 1:] * (1.0 + reach))):
-                return Reduction(T, slack, used, np.abs(independent) @ missed, reach)
+                return Reduction(T, slack, used, np.abs(independent) @ missed, reach, tuple(rounds), independent)
         kept, A = np.setdiff1d(np.arange(m), out), (weights @ table)[:, ~square][:, 1:][:, out]
         picked = _choose_pivots(A.T, len(out))
         weights = np.linalg.inv(A[picked]) @ weights[picked]
+        rounds.append((out, weights))
         rows = weights @ table
         linear = rows[:, ~square]
         # an eliminated unknown is minus what its row has besides, but for equations' values and what does not cancel

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from ..errors import ExternalSolverFailure
 from ..geometry.vectors import Array
 from ..results import Value
 from .linear_elimination import Reduction, eliminate_linear
-from .solution_boxes import enclose_all_solutions, find_solutions
+from .solution_boxes import AlgebraEvidence, enclose_all_solutions, find_solutions
 from .uniqueness import enclose_unique, is_excluded
 
 CASES_MAX = 512
@@ -34,6 +34,22 @@ class SolutionBox(Value):
     radii: Array
 
 
+@dataclass(eq=False)
+class SolvingStep:
+    """Record of a case: an elimination, then cases of one unknown (by its number from 1, with the weights of the
+    equation that has it alone), or algebra."""
+
+    reduced: Reduction
+    contradictory: bool = False
+    unknown: int = 0
+    weights: Array | None = None
+    cases: list[tuple[float, float, SolvingStep]] = field(default_factory=list)
+    """Value of the unknown, its error, and what solved the case."""
+    algebra: AlgebraEvidence | None = None
+    points: list[tuple[int, Array]] = field(default_factory=list)
+    """Numbers of eigenvalues, and the solutions (m,) to which their boxes were shrunk."""
+
+
 class QuadricSolver:
     """Solver of a system, with what it did.
 
@@ -45,10 +61,13 @@ class QuadricSolver:
         Unknowns that linear equations leave in the first one.
     degree
         Largest degree of the combinations.
+    last
+        What solved the last case, after :meth:`solve` the whole.
     """
 
     def __init__(self) -> None:
         self.cases, self.left, self.degree, self.solved = 0, 0, 0, 0
+        self.last: SolvingStep | None = None
 
     def solve(self, matrices: Array, errors: Array, farthest: Array) -> tuple[list[SolutionBox], Array]:
         """Return boxes that hold all real solutions x within bounds, and other solutions (k, n), without proof.
@@ -73,10 +92,11 @@ class QuadricSolver:
         reduced = eliminate_linear(matrices, errors, farthest)
         if self.solved == 1:
             self.left = len(reduced.farthest)
-        if _is_contradictory(reduced):
-            return [], np.zeros((0, len(farthest)))
-        boxes, others = self._solve_reduced(reduced)
-        T = reduced.T[1:]
+        step = SolvingStep(reduced, _is_contradictory(reduced))
+        boxes, others = list[SolutionBox](), np.zeros((0, len(reduced.farthest)))
+        if not step.contradictory:
+            boxes, others = self._solve_reduced(step)
+        self.last, T = step, reduced.T[1:]
         return (
             [
                 SolutionBox(T @ np.append(1.0, box.middle), reduced.slack + np.abs(T[:, 1:]) @ box.radii)
@@ -85,22 +105,26 @@ class QuadricSolver:
             T[:, 0] + others @ T[:, 1:].T,
         )
 
-    def _solve_reduced(self, reduced: Reduction) -> tuple[list[SolutionBox], Array]:
+    def _solve_reduced(self, step: SolvingStep) -> tuple[list[SolutionBox], Array]:
         """Return boxes of the unknowns that remain (m,), and other solutions (k, m)."""
+        reduced = step.reduced
         m, is_complex = len(reduced.farthest), np.iscomplexobj(reduced.table)
         if m == 0:
             return ([], np.zeros((1, 0))) if is_complex else ([SolutionBox(np.zeros(0), np.zeros(0))], np.zeros((0, 0)))
         if not len(reduced.table):
             raise ExternalSolverFailure("natural coordinates", f"nothing holds {m} unknowns")
         matrices, errors, boxes = expand(reduced.table, m), reduced.errors, list[SolutionBox]()
-        cases = _find_cases(reduced)
-        if cases is not None:
-            others = np.zeros((0, m))
-            for k, value, off in cases:
+        single = _find_single_unknown(reduced)
+        if single is not None:
+            k, step.weights, cases = single
+            step.unknown, others = k, np.zeros((0, m))
+            for value, off in cases:
                 fixed = np.zeros((1, m + 1, m + 1), dtype=type(value))
                 fixed[0, 0, 0], fixed[0, 0, k], fixed[0, k, 0] = -value, 0.5, 0.5
                 more, besides = self.solve(np.vstack([matrices, fixed]), np.append(errors, off), reduced.farthest)
                 boxes, others = boxes + more, np.vstack([others, besides])
+                if not isinstance(value, complex) and self.last is not None:
+                    step.cases.append((value, off, self.last))
             return boxes, others
         if is_complex:
             points = find_solutions(reduced.table, m)
@@ -110,17 +134,21 @@ class QuadricSolver:
         enclosed = enclose_all_solutions(reduced.table, errors, reduced.farthest)
         if enclosed is None:
             raise ExternalSolverFailure("natural coordinates", f"{m} unknowns are not confined")
-        self.degree = max(self.degree, enclosed.degree)
-        for middle, radii in zip(enclosed.middles, enclosed.radii, strict=True):
-            if not is_excluded(matrices, errors, middle, radii):
-                boxes.append(SolutionBox(*(enclose_unique(matrices, errors, middle, radii) or (middle, radii))))
+        self.degree, step.algebra = max(self.degree, enclosed.degree), enclosed.evidence
+        for k, middle, radii in zip(enclosed.evidence.real, enclosed.middles, enclosed.radii, strict=True):
+            if is_excluded(matrices, errors, middle, radii):
+                continue
+            smaller = enclose_unique(matrices, errors, middle, radii)
+            boxes.append(SolutionBox(*(smaller or (middle, radii))))
+            if smaller is not None:
+                step.points.append((k, smaller[0]))
         return boxes, enclosed.others
 
 
 def expand(table: Array, m: int) -> Array:
     """Return the symmetric matrices (N, m + 1, m + 1) of coefficients (N, terms)."""
     upper = np.triu_indices(m + 1)
-    matrices = np.zeros((len(table), m + 1, m + 1))
+    matrices = np.zeros((len(table), m + 1, m + 1), dtype=table.dtype)
     matrices[:, upper[0], upper[1]] = table / 2
     return np.asarray(matrices + matrices.transpose(0, 2, 1))
 
@@ -133,9 +161,9 @@ def _is_contradictory(reduced: Reduction) -> bool:
     return bool(np.any(np.abs(reduced.table[:, 0]) > others @ reduced.sizes[1:] + reduced.errors))
 
 
-def _find_cases(reduced: Reduction) -> list[tuple[int, float | complex, float]] | None:
-    """Return the values of an unknown, by its number from 1, and errors of real ones, by an equation without others;
-    None without one."""
+def _find_single_unknown(reduced: Reduction) -> tuple[int, Array, list[tuple[float | complex, float]]] | None:
+    """Return an unknown, by its number from 1, the weights of an equation without others, and the values that it gives
+    with errors of real ones; None without one."""
     m = len(reduced.farthest)
     i, j = np.triu_indices(m + 1)
     for k in range(1, m + 1):
@@ -150,7 +178,7 @@ def _find_cases(reduced: Reduction) -> list[tuple[int, float | complex, float]] 
         if abs(a) < LEADING_MIN:
             continue
         off = np.abs(weights[best]) @ reduced.errors + np.abs(rows[best, ~alone]) @ reduced.sizes[~alone]
-        return [(k, value, error) for value, error in enclose_square_roots(b / a, c / a, float(off / abs(a)))]
+        return k, weights[best], enclose_square_roots(b / a, c / a, float(off / abs(a)))
     return None
 
 

@@ -17,6 +17,7 @@ from itertools import combinations_with_replacement
 from math import comb
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..geometry.vectors import Array
 from ..results import Value
@@ -36,6 +37,25 @@ NEGLECTED_MAX = 1e-3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class AlgebraEvidence(Value):
+    """A basis, by its exponents (K, m), of polynomials modulo equations; products as sums of it, C; the multiples of
+    equations that show them, as weights (targets, multiples) of quadrics times monomials; a random sum of the unknowns
+    and the eigenvectors of its matrix."""
+
+    basis: Array
+    C: Array
+    weights: Array
+    quadrics: NDArray[np.intp]
+    factors: Array
+    sum: Array
+    eigenvalues: Array
+    V: Array
+    W: Array
+    real: tuple[int, ...]
+    """Numbers of the eigenvalues that have a box."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Confinement(Value):
     """All real solutions within the bounds, each in a box of its own.
 
@@ -47,12 +67,15 @@ class Confinement(Value):
         Solutions that are not real (l, m), as eigenvectors give them, without proof.
     degree
         Degree of the combinations.
+    evidence
+        What the boxes are computed from.
     """
 
     middles: Array
     radii: Array
     others: Array
     degree: int
+    evidence: AlgebraEvidence
 
 
 @lru_cache(maxsize=64)
@@ -233,4 +256,16 @@ def _enclose_all(
         middles = np.vstack([middles, values @ b.real])
         radii = np.vstack([radii, off_values + np.abs(values) @ (b_off + rounding * np.abs(b))])
     others = _read_points(quotient, V[:, ~real])
-    return Confinement(middles, radii, others, multiples.degree)
+    evidence = AlgebraEvidence(
+        multiples.exponents[basis],
+        C,
+        weights,
+        multiples.quadrics,
+        multiples.exponents[multiples.factors],
+        r,
+        eigenvalues,
+        V,
+        W,
+        tuple(int(k) for k in np.flatnonzero(real)),
+    )
+    return Confinement(middles, radii, others, multiples.degree, evidence)

@@ -78,7 +78,11 @@ def test_a_search_finds_only_what_a_complete_list_of_a_random_robot_has(kind: st
 def test_a_robot_without_a_list_has_modes_that_are_found(word: str):
     observed = hrsynth.observe(robot(word))
     at = observed.configurations[3]
-    found = hrsynth.modes(observed, at=at)
+    listed = hrsynth.modes(observed, at=at)
+    if listed.found.complete:  # in natural coordinates, unless the time is short
+        assert listed.found.bound == "combinations"
+        check_agreement(listed)
+    found = hrsynth.modes(observed, at=at, time_limit=1.0)
     assert (found.found.complex, found.found.complete, found.found.bound) == (None, False, "none")
     assert found.found.proof.startswith("found from ")
     assert found.to_dict()["complex"] is None
@@ -110,6 +114,7 @@ def test_poses_that_the_measurements_leave_free_are_told_and_not_listed():
 
 @pytest.mark.slow
 def test_without_the_solver_the_modes_are_found_and_the_extra_is_named(monkeypatch: pytest.MonkeyPatch):
+    """Where the time is too short for natural coordinates, which need none."""
     import importlib.metadata
 
     def absent(name: str) -> None:
@@ -117,7 +122,9 @@ def test_without_the_solver_the_modes_are_found_and_the_extra_is_named(monkeypat
 
     monkeypatch.setattr(importlib.metadata, "files", absent)
     monkeypatch.setattr(shutil, "which", lambda name: None)
-    found = hrsynth.modes(robot("quattro"), real=True)
+    listed = hrsynth.modes(robot("quattro"), real=True)
+    assert (listed.found.complete, listed.found.bound, len(listed.modes)) == (True, "combinations", 4)
+    found = hrsynth.modes(robot("quattro"), real=True, time_limit=3.0)
     assert not found.found.complete
     assert len(found.modes) > 1
     assert 'pip install "hrsynth[solve]"' in found.found.proof
