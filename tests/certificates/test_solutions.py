@@ -200,6 +200,8 @@ ALGEBRA: dict[str, Callable[[Record, int], Any]] = {
     "an eigenvalue less": lambda node, k: node["eigenvalues"].pop(k),
     "a monomial less": lambda node, k: node["basis"].pop(),
     "a sum of nothing": lambda node, k: node.update(sum=["0"] * len(node["sum"])),
+    "a negative power": lambda node, k: node["multiples"][0][0].__setitem__(1, [-1] + [0] * (len(node["sum"]) - 1)),
+    "a broken power": lambda node, k: node["multiples"][0][0].__setitem__(1, [0.5] + [0] * (len(node["sum"]) - 1)),
     "no multiples": lambda node, k: node.update(multiples=[[]] * len(node["multiples"])),
 }
 
