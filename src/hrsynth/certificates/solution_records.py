@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
 from ..analysis.modes.natural_modes import NaturalPlatform
 from ..geometry.vectors import Array
+from ..solving.linear_elimination import list_coefficients
 from ..solving.quadric_solver import QuadricSolver, SolvingStep, expand
 from ..solving.solution_boxes import AlgebraEvidence
 from ..solving.uniqueness import evaluate_quadrics
+from .closures import write_numbers
 
 WIDER_FRACTION = 4.0
 """By how much intervals of cases are wider than their error."""
@@ -27,42 +28,28 @@ def build_record(system: NaturalPlatform, solutions: Sequence[Array]) -> dict[st
     assert solver.last is not None
     n = len(view.goal)
     i, j = np.triu_indices(n + 1)
-    rows = [row for link in system.links for row in _list_pose_rows(system, link)]
-    spread = max(float((np.abs(np.array(rows)[:, 1:]) @ box.radii).max()) for box in boxes)
+    rows = system.list_pose_rows()
+    spread = max(float((np.abs(rows[:, 1:]) @ box.radii).max()) for box in boxes)
     digits = int(np.clip(-np.ceil(np.log10(WIDER_FRACTION * spread)), 4, 9))
-    equations = []
-    for M in view.matrices:
-        table = (M * (2 - np.eye(n + 1)))[i, j]
-        used = np.flatnonzero(table)
-        equations.append([[int(i[k]), int(j[k]), write_number(table[k])] for k in used])
+    equations = [
+        [[int(i[k]), int(j[k]), write_numbers(row[k])] for k in np.flatnonzero(row)]
+        for row in list_coefficients(view.matrices)
+    ]
     return {
         "system": {
             "equations": equations,
-            "errors": [write_number(e) for e in view.errors],
-            "farthest": [write_number(x) for x in view.farthest],
-            "pose": [[[int(k), write_number(row[k])] for k in np.flatnonzero(row)] for row in rows],
+            "errors": write_numbers(view.errors),
+            "farthest": write_numbers(view.farthest),
+            "pose": [[[int(k), write_numbers(row[k])] for k in np.flatnonzero(row)] for row in rows],
         },
         "digits": digits,
-        "solutions": [[write_number(v) for v in x] for x in solutions],
+        "solutions": write_numbers(solutions),
         "proof": _write_step(solver.last, np.eye(len(view.matrices))),
     }
 
 
-def _list_pose_rows(system: NaturalPlatform, link: str) -> list[Array]:
-    """Return the rows (n + 1,) of a link's point and of the images of three directions or two."""
-    group, origin, _ = system.view.links[link]
-    basis = system.view.groups[group][0]
-    blocks = [system.view.point(link, origin), *(system.view.direction(link, column) for column in basis.T)]
-    return list(np.concatenate(blocks))
-
-
-def write_number(value: float) -> str:
-    """Return a number as text, exactly."""
-    return str(Fraction(float(value)))
-
-
 def _write_weights(weights: Array) -> list[list[Any]]:
-    return [[int(k), write_number(weights[k])] for k in np.flatnonzero(weights)]
+    return [[int(k), write_numbers(weights[k])] for k in np.flatnonzero(weights)]
 
 
 def _write_step(step: SolvingStep, given: Array) -> dict[str, Any]:
@@ -86,7 +73,7 @@ def _write_step(step: SolvingStep, given: Array) -> dict[str, Any]:
         cases = []
         for value, off, inner in sorted(step.cases, key=lambda case: case[0]):
             radius = WIDER_FRACTION * off + INTERVAL_RADIUS_MIN
-            interval = [write_number(value - radius), write_number(value + radius)]
+            interval = write_numbers([value - radius, value + radius])
             cases.append({"interval": interval, "node": _write_step(inner, below)})
         weights = _write_weights(step.weights @ used)
         return {**record, "kind": "cases", "unknown": step.unknown, "weights": weights, "cases": cases}
@@ -97,8 +84,8 @@ def _write_step(step: SolvingStep, given: Array) -> dict[str, Any]:
         inverses.append(
             {
                 "eigenvalue": k,
-                "middle": [write_number(v) for v in x],
-                "inverse": [[write_number(c) for c in row] for row in C],
+                "middle": write_numbers(x),
+                "inverse": write_numbers(C),
             }
         )
     return {**record, "kind": "algebra", **_write_algebra(step.algebra, used), "inverses": inverses}
@@ -110,20 +97,15 @@ def _write_algebra(found: AlgebraEvidence, used: Array) -> dict[str, Any]:
         terms = []
         for h in np.flatnonzero(row):
             for e in np.flatnonzero(used[found.quadrics[h]]):
-                terms.append([int(e), found.factors[h].tolist(), write_number(row[h] * used[found.quadrics[h], e])])
+                terms.append([int(e), found.factors[h].tolist(), write_numbers(row[h] * used[found.quadrics[h], e])])
         multiples.append(terms)
-
-    def write_complex(values: Array) -> list[Any]:
-        if values.ndim > 1:
-            return [write_complex(row) for row in values]
-        return [[write_number(value.real), write_number(value.imag)] for value in values.tolist()]
 
     return {
         "basis": found.basis.tolist(),
-        "C": [[write_number(c) for c in row] for row in found.C],
+        "C": write_numbers(found.C),
         "multiples": multiples,
-        "sum": [write_number(c) for c in found.sum],
-        "eigenvalues": write_complex(found.eigenvalues),
-        "V": write_complex(found.V),
-        "W": write_complex(found.W),
+        "sum": write_numbers(found.sum),
+        "eigenvalues": write_numbers(np.stack([found.eigenvalues.real, found.eigenvalues.imag], axis=-1)),
+        "V": write_numbers(np.stack([found.V.real, found.V.imag], axis=-1)),
+        "W": write_numbers(np.stack([found.W.real, found.W.imag], axis=-1)),
     }

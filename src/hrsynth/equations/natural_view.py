@@ -8,7 +8,7 @@ chapter 2). Lengths are in characteristic lengths.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -192,7 +192,7 @@ def read_natural_view(
     # two points and two directions; in products they are multiplied by what they are within
     linear = ~np.any(matrices[:, 1:, 1:], axis=(1, 2))
     errors = off * np.where(linear, 4.0, 4.0 * size)
-    return NaturalView(matrices, errors, view.goal, farthest, links, groups)
+    return replace(view, matrices=matrices, errors=errors)
 
 
 def _read(

@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 from ..geometry.vectors import Array
 from ..results import Value
 
-COMBINATION_MIN = 1e-7
-"""Smallest singular value, over the largest, of equations that are used: an error is divided by it."""
 CANCELLED_MAX = 1e-7
 """Singular value of quadratic parts below which they cancel; what is left of them counts as error."""
 LINEAR_MIN = 1e-6

@@ -175,9 +175,8 @@ def enclose_all_solutions(table: Array, errors: Array, farthest: Array) -> Confi
 def find_solutions(table: Array, m: int) -> Array | None:
     """Return all solutions (k, m) of quadrics with complex coefficients, from eigenvectors, without proof; None where
     they are not isolated."""
-    for _, quotient in _list_quotients(table, m):
-        return _read_points(quotient, np.linalg.eig(_sum_products(quotient, m))[1])
-    return None
+    first = next(_list_quotients(table, m), None)
+    return None if first is None else _read_points(first[1], np.linalg.eig(_sum_products(first[1], m))[1])
 
 
 def _list_quotients(table: Array, m: int) -> Iterator[tuple[Multiples, _QuotientAlgebra]]:

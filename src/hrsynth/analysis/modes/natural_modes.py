@@ -78,14 +78,20 @@ class NaturalPlatform(System):
         pairs = zip(self.place_all(x).values(), self.place_all(y).values(), strict=True)
         return max(compare_poses(X, Y, self.size) for X, Y in pairs)
 
+    def list_pose_rows(self) -> Array:
+        """Return the rows (k, n + 1) of points and images of directions of the links that place the platform."""
+        rows = list[Array]()
+        for link in self.links:
+            group, origin, _ = self.view.links[link]
+            rows.append(self.view.point(link, origin))
+            rows += [self.view.direction(link, column) for column in self.view.groups[group][0].T]
+        return np.concatenate(rows)
+
     def count_poses(self, points: Sequence[Array]) -> int:
         """Return the number of distinct poses at points x (n,), complex ones too."""
-        rows = [self.view.point(link, self.view.links[link][1]) for link in self.links]
-        for link in self.links:
-            rows += [self.view.direction(link, column) for column in self.view.groups[self.view.links[link][0]][0].T]
-        distinct = list[Array]()
+        rows, distinct = self.list_pose_rows(), list[Array]()
         for x in points:
-            pose = np.concatenate(rows) @ np.append(1.0, x)
+            pose = rows @ np.append(1.0, x)
             size = 1.0 + np.abs(pose).max()
             if all(np.abs(pose - known).max() > SAME_POSE_TOL * size for known in distinct):
                 distinct.append(pose)
