@@ -505,30 +505,16 @@ def test_a_number_of_a_certificate_is_short(tmp_path: Path):
 
 def certificates() -> Iterator[tuple[str, dict[str, Any]]]:
     """Small certificates that say little and would take long, with the claim that they make."""
-    box = {"reaches": [], "boxes": [], "bound": {"kind": "degrees", "groups": []}}
-    zero, ways = [["1", "0", "0"]], {"loops": [], "besides": [], "links": [], "others": []}
-    for angles, turns in ((300, 1), (30, 1), (12, 12), (10**9, 0)):
-        loop = [[["1", "0"], -1, [turns] * (angles if turns else 0)]]
+    box = {"reaches": [], "boxes": [], "bound": {"kind": "rank", "groups": []}}
+    for joints in (9, 40):
         yield (
-            f"{angles} angles",
-            {
-                "claim": "modes",
-                "systems": [
-                    {"kind": "loops", "tips": zero, "angles": angles, "slides": 0, **ways, "loops": [loop], **box}
-                ],
-            },
-        )
-    for unknowns, joints in ((10**7, 1), (1, 40), (30, 30)):
-        yield (
-            f"{unknowns} unknowns",
+            f"{joints} joints",
             {
                 "claim": "modes",
                 "systems": [
                     {
                         "kind": "chain",
-                        "tips": [*zero, ["0", "1", "0"], ["0", "0", "1"]],
-                        "unknowns": unknowns,
-                        "normals": [],
+                        "tips": [["1", "0", "0"], ["0", "1", "0"], ["0", "0", "1"]],
                         "joints": [["R", ["0", "0", "1"], ["0", "0", "0"]]] * joints,
                         "ends": [[1]],
                         **box,
@@ -552,13 +538,13 @@ def certificates() -> Iterator[tuple[str, dict[str, Any]]]:
 
 @pytest.mark.parametrize(
     ("what", "record"),
-    [pytest.param(*each, id=each[0], marks=[pytest.mark.slow] * (each[0] == "12 angles")) for each in certificates()],
+    [pytest.param(*each, id=each[0]) for each in certificates()],
 )
 def test_a_small_certificate_is_checked_soon(what: str, record: dict[str, Any]):
     checker = verify_ranks if record["claim"] == "ranks" else verify_certificate
     record = {"format": "hrsynth-certificate-1", "real": 0, "complex": 0, **record}
     start = time.process_time()
-    with pytest.raises(InvalidCertificate, match=r"n < 25|terms|unknowns|rows or columns"):
+    with pytest.raises(InvalidCertificate, match=r"terms|joints|rows or columns"):
         verify({**record, "sha256": checker.digest(record)})
     assert time.process_time() - start < allow(5)
 

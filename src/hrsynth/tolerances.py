@@ -157,9 +157,8 @@ MODE_SEARCH_QUIET_STARTS_COUNT = 100
 """Closed starts without a new mode that end this search."""
 MODE_SEARCH_ITERATIONS_MAX = 100
 """Iterations that close each start."""
-LARGEST_GEAR, LARGEST_LOOPS, PLANAR_STARTS, LOOP_SYSTEMS = 6, 120, 20, 3
-"""Planar loops: largest numerator of a ratio, solutions searched, multiples of 64 random starts, choices of square
-systems."""
+GEAR_RATIO_MAX = 6
+"""Largest numerator and denominator of the ratio of coupled rotations whose modes are listed."""
 
 TUBE_RADII_COUNT = 4
 """Number of radii tried for a tube."""

@@ -150,19 +150,9 @@ def other_far(record: Record, rng: random.Random) -> None:
 
 
 def other_geometry(record: Record, rng: random.Random) -> None:
-    """A curve of another size, a tip elsewhere, or another vector of a loop."""
+    """A curve of another size, or a tip elsewhere."""
     system = rng.choice(record["systems"])
-    if system["kind"] == "loops":
-        vectors = [vector for loop in system["loops"] for vector, slide, _ in loop if slide < 0]
-        if not vectors:
-            return wrong_count(record, rng)
-        vector = rng.choice(vectors)
-        k = rng.randrange(2)
-        vector[k] = moved(vector[k], amount(rng))
-        return None
-    if system.get("normals"):
-        return other_rest(system, rng)
-    reach = rng.choice(system["reaches"][: system.get("square", system.get("unknowns"))])
+    reach = rng.choice(system["reaches"][: system.get("square", len(system.get("joints", [])) or None)])
     ((kind, vectors),) = reach.items()
     if kind == "circle":
         factor = 1 + amount(rng)
@@ -174,19 +164,6 @@ def other_geometry(record: Record, rng: random.Random) -> None:
         by = amount(rng)
         vectors[0] = [moved(x, by * Fraction(d)) for x, d in zip(vectors[0], across, strict=True)]
     return None
-
-
-def other_rest(system: Record, rng: random.Random) -> None:
-    """A joint of a loop that has no unknown elsewhere, or longer than one, or another normal."""
-    if rng.random() < 0.3:
-        rng.choice(system["normals"])[0] = "1"
-        return
-    _, axis, point = rng.choice(system["joints"][system["unknowns"] :])
-    by = amount(rng)
-    if rng.random() < 0.5:
-        axis[0] = moved(axis[0], by)
-    else:
-        point[:] = [moved(x, by * Fraction(d)) for x, d in zip(point, other(axis), strict=True)]
 
 
 def other(direction: list[str]) -> list[str]:

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from itertools import product
 from typing import Any
 
-from ..analysis.modes.planar_loops import groupings, unknowns
 from .refining import Polynomial
-from .verify_certificate import PRIME, CertificateRejection, degrees, multiples, poses, rank
+from .verify_certificate import PRIME, CertificateRejection, multiples, poses, rank
 
 MONOMIAL_CAP_MAX = 6
 """Largest cap of the monomials of a rank bound."""
@@ -29,13 +27,6 @@ def bound(record: dict[str, Any], equations: Sequence[Polynomial], halves: Seque
         if poses(equations, halves, record) == count:
             return {"kind": "poses"}
         raise CertificateRejection(f"{count} solutions are enclosed, but the checker cannot exclude more")
-    if record["kind"] == "loops":
-        loops = [unknowns(((slide, turns) for _, slide, turns in loop), record["angles"]) for loop in record["loops"]]
-        for grouping in groupings(record["angles"], record["slides"], loops):
-            with suppress(TypeError):  # no bound
-                least = min(least, int(degrees(equations, halves, record | {"bound": {"groups": grouping}})))
-            if least == count:
-                return {"kind": "degrees", "groups": grouping}
     for most in (0, MULTIPLES_ABOVE_CAP_MAX) if len(halves) <= UNKNOWNS else ():
         best, worse = math.inf, 0
         for groups in _groups(halves, most):

@@ -7,7 +7,7 @@ solution is refined and enclosed, and the smallest bound that proves the count i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
@@ -16,27 +16,21 @@ from typing import Any
 import numpy as np
 
 from ..analysis.measured import MeasuredRobot
-from ..analysis.modes.branches import Model
-from ..analysis.modes.carrying_leg_modes import solve_carried
 from ..analysis.modes.carrying_leg_system import CarriedPlatform
+from ..analysis.modes.goal_error import drift
 from ..analysis.modes.modes import AssemblyModes, modes
-from ..analysis.modes.natural_modes import NaturalPlatform
-from ..analysis.modes.planar_loops import PlanarLoops
-from ..analysis.modes.planar_reading import planar_loops
+from ..analysis.modes.natural_modes import NaturalPlatform, solve_natural
 from ..analysis.modes.quadrics import WorkingFrame
-from ..analysis.modes.single_loop import SingleLoop, solve_loop
 from ..analysis.modes.solve import SystemModes
 from ..analysis.observed import ObservedRobot
-from ..errors import ExternalSolverFailure, NoCertificate, UnsupportedLocus
+from ..errors import ExternalSolverFailure, NoCertificate, TooLarge, UnsupportedLocus
 from ..geometry.vectors import Array
-from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism import Mechanism
 from ..mechanism.pose import Pose
 from . import verify_solutions
 from .bounds import bound
-from .chains import chains
+from .chains import write_chain
 from .closures import ClosedRobot, write_numbers
-from .planar_records import closings
 from .proposed import ProposedRecord
 from .refining import Polynomial, ScaledEquations
 from .solution_records import build_record
@@ -70,24 +64,25 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
         return build_solutions_certificate(found, found.model.system, about)
     robot = ClosedRobot.of(found)
     try:
-        system = None if found.model is None else found.model.system
-        if found.found.complete and isinstance(system, CarriedPlatform):
-            try:
-                return of_chain(system, found, about, robot)
-            except CertificateRejection as reason:
-                other = solve_carried if isinstance(system, SingleLoop) else solve_loop
-                return _as_chain(found, about, robot, reason, other)
-        if found.found.complete and not found.found.solved:
-            with suppress(UnsupportedLocus):
-                return build_loops_certificate(found, about, robot)
-        try:
-            return of_systems(found.found, about, robot)
-        except CertificateRejection as reason:
-            if found.found.solved or not found.found.complete:
-                raise
-            return _as_chain(found, about, robot, reason, solve_carried, solve_loop)
+        if found.found.complete and found.model is not None and isinstance(found.model.system, CarriedPlatform):
+            return of_chain(found.model.system, found, about, robot)
+        return of_systems(found.found, about, robot)
     except CertificateRejection as reason:
+        if found.found.complete and (natural := _list_again(found)) is not None:
+            assert natural.model is not None
+            assert isinstance(natural.model.system, NaturalPlatform)
+            return build_solutions_certificate(natural, natural.model.system, about)
         raise NoCertificate(found.setup.robot.name, str(reason)) from None
+
+
+def _list_again(found: AssemblyModes) -> AssemblyModes | None:
+    """Return a list in natural coordinates; None where that has not as many modes."""
+    measured, goal = MeasuredRobot.of(found.setup, found.kind == "real"), found.goal
+    with suppress(UnsupportedLocus, ExternalSolverFailure, TooLarge):
+        model, listed = solve_natural(measured, goal, drift(goal, None, found.setup.normal.moved))
+        if len(listed.modes) == len(found.modes) + len(found.antipodal):
+            return replace(found, model=model, found=listed)
+    return None
 
 
 def build_solutions_certificate(
@@ -121,66 +116,25 @@ def of_systems(found: SystemModes, about: Mapping[str, Any], robot: ClosedRobot 
     )
 
 
-def build_loops_certificate(
-    found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot | None
-) -> dict[str, Any]:
-    """The certificate of the modes of a planar mechanism from its joints; raises ``CertificateRejection``,
-    ``UnsupportedLocus``."""
-    system = None if found.model is None else found.model.system
-    if not isinstance(system, PlanarLoops):
-        system = planar_loops(_measured_robot(found), found.goal)
-    proposed = closings(system, found.found.complex or 0)
-    return _seal([_system(proposed, robot)], about, robot, found.found.complex or 0)
-
-
 def of_chain(
     system: CarriedPlatform, found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot | None
 ) -> dict[str, Any]:
-    """The certificate of a platform that a leg carries, or of a single loop; raises ``CertificateRejection``."""
+    """The certificate of a platform that a leg carries; raises ``CertificateRejection``."""
     assert found.model is not None
-    modes_, why = found.found.modes, "no joint of its loop is between its base and its platform"
+    modes_ = found.found.modes
     frame = WorkingFrame(system.middle.origin, system.rows, system.size, system.rows[2])
-    for each in chains(system, [mode.q for mode in modes_]):
-        kept = [mode is not None for mode in each.modes]
-        if sum(kept) == len(modes_):
-            R, p = system.transform(each.home, system.carrying)
-            there = [None if k is None else system.transform(modes_[k].q, system.carrying) for k in each.modes]
-            poses = [
-                np.empty(0) if to is None else np.column_stack([to[0] @ R.T, to[1] - to[0] @ R.T @ p]) for to in there
-            ]
-            bodies = [None if k is None else found.model.bodies(modes_[k].q) for k in each.modes]
-            try:
-                made = _system(ProposedRecord(each.record, each.starts, poses, kept, bodies, frame), robot)
-                return _seal([made], about, robot, found.found.complex or 0)
-            except CertificateRejection as reason:
-                why = str(reason)
-        else:
-            why = f"{len(each.starts)} solutions were enclosed, {sum(kept)} of {len(modes_)} modes among them"
-    raise CertificateRejection(why)
-
-
-def _as_chain(
-    found: AssemblyModes,
-    about: Mapping[str, Any],
-    robot: ClosedRobot | None,
-    reason: CertificateRejection,
-    *ways: Callable[[MeasuredRobot, ClosedConfiguration, float], tuple[Model, SystemModes]],
-) -> dict[str, Any]:
-    """Return the certificate of a mechanism that is a carried platform, or one loop, besides the method of its list;
-    raises ``CertificateRejection``."""
-    assert found.model is not None
-    for way in ways:
-        with suppress(UnsupportedLocus, ExternalSolverFailure, CertificateRejection):
-            model, listed = way(_measured_robot(found), found.goal, found.model.system.error)
-            system = model.system
-            if listed.complete and listed.complex == found.found.complex and isinstance(system, CarriedPlatform):
-                return of_chain(system, replace(found, model=model, found=listed), about, robot)
-    raise reason
-
-
-def _measured_robot(found: AssemblyModes) -> MeasuredRobot:
-    """Return the count of the list."""
-    return MeasuredRobot.of(found.setup, found.kind == "real")
+    chain = write_chain(system, [mode.q for mode in modes_])
+    kept = [mode is not None for mode in chain.modes]
+    if sum(kept) < len(modes_):
+        raise CertificateRejection(
+            f"{len(chain.starts)} solutions were enclosed, {sum(kept)} of {len(modes_)} modes among them"
+        )
+    R, p = system.transform(chain.home, system.carrying)
+    there = [None if k is None else system.transform(modes_[k].q, system.carrying) for k in chain.modes]
+    poses = [np.empty(0) if to is None else np.column_stack([to[0] @ R.T, to[1] - to[0] @ R.T @ p]) for to in there]
+    bodies = [None if k is None else found.model.bodies(modes_[k].q) for k in chain.modes]
+    made = _system(ProposedRecord(chain.record, chain.starts, poses, kept, bodies, frame), robot)
+    return _seal([made], about, robot, found.found.complex or 0)
 
 
 def _seal(

@@ -17,7 +17,6 @@ from ..analysis.modes.square_systems import TURNS, SquareSystem
 from ..analysis.modes.translating import ArticulatedPlatform, TranslatingPlatform, is_coplanar, met_normal
 from ..geometry.vectors import Array
 from .closures import ClosedRobot, round_numbers, write_numbers
-from .planar_records import in_space, planar_system
 from .poses import regular
 from .proposed import ProposedRecord, placed_in, starts_of
 from .reach_records import point_on, reach_record
@@ -35,7 +34,7 @@ def propose(solved: SquareSolution, robot: ClosedRobot | None) -> ProposedRecord
         poses,
         solved.kept,
         [None if robot is None else robot.bodies(mode) for mode in solved.modes],
-        in_space(frame),
+        frame,
     )
 
 
@@ -52,7 +51,7 @@ def _write_system(
     frame, turns = part.frame, part.turns(roots.turn)
     values, real = starts_of(roots)
     if isinstance(system, Planar):
-        return planar_system(solved)
+        raise CertificateRejection("no equations for planar platforms")
     if isinstance(system, Spatial):
         legs = [*part.legs, *(k for k in range(len(system.curves)) if k not in part.legs)]
         origins = iter(turns)

@@ -7,8 +7,6 @@
   Where they annul f independent vectors on H (zeros at infinity), rank H <= |H| - f. If the rank of H and S is no less
   than |H| - f + |S|, B spans all modulo the equations: |B| + |S| + |H| - f - rank zeros; modulo a prime ranks are no
   larger. The tangent of half an angle has its own cap, no H: a pose where it is infinite would be such a vector on S.
-* At most, *degrees*: Bezout in a product of projective spaces, and no curve besides so many zeros: on it the leading
-  forms would have a zero, and isolated ones be fewer (Bernstein, Funct. Anal. Appl. 9, 1975, Theorem B).
 * At most, *poses*: conditions *on a sphere*, *on a plane* on points of a rigid body are linear in 17 coordinates in
   which poses have dimension 6 and degree 40 (Gallet, Nawratil, Schicho, J. Geom. 106, 2015): of six at most 40 zeros,
   at infinity too, and no curve besides 40. A fixed tip, or six planes, leave three quadrics: 8; rods in a ball: 16.
@@ -175,31 +173,6 @@ def spatial(system, tips):
     return found, halves, points, legs
 
 
-def loops(system, tips):
-    """Links in the plane z = 0 that turn by whole multiples of angles: sums of their vectors vanish, some along slides.
-    Unknowns: cosines, sines, slides. Each tip's link has its turns and shifts; also points of others."""
-    a, n = system["angles"], 2 * system["angles"] + system["slides"]
-
-    def turned(vector, slide, turns):  # times cos + i sin of each angle so often, and a slide where it is not -1
-        need(slide in range(-1, n - 2 * a) and len(turns) == a and all(abs(k) < 13 for k in turns), "turns and slides")
-        x, y = (mul(term(c, n), term(1, n, 2 * a + slide if slide >= 0 else None)) for c in rational(vector))
-        for j, sign in ((j, k // abs(k)) for j, k in enumerate(turns) for _ in range(abs(k))):
-            c, s = term(1, n, j), term(sign, n, a + j)
-            x, y = minus(mul(x, c), mul(y, s)), add(mul(x, s), mul(y, c))
-        return x, y
-
-    def total(vectors):
-        return [add(*parts) for parts in zip(*(turned(*each) for each in vectors))]
-
-    need(2 * a <= n < 25 and len(system["reaches"]) <= len(tips) and not any(b[2] for b in tips), "a plane, n < 25")
-    found = [p for loop in system["loops"] for p in total(loop)]
-    found += [add(*(mul(x, x) for x in (term(1, n, j), term(1, n, a + j))), term(-1, n)) for j in range(a)]
-    at = [total([*shift, [b[:2], -1, e]]) for b, (e, shift) in zip(system["tips"], system["links"], strict=True)]
-    points = [([*N, {}], inner(N, N), term(1, n)) for N in (*at, *map(total, system["others"]))]
-    legs = [misfits(conditions(*each)) for each in zip(points, map(reach_of, system["reaches"]))]
-    return found, [False] * n, points, [*map(total, system["besides"]), *legs]
-
-
 def shifting(system, tips):
     """Bodies that translate: x, y, z of the first, the second on ``slide`` about it. Of spheres, and of
     parallel planes, all but the first are replaced by their difference from it."""
@@ -264,14 +237,14 @@ def pose(system, tips):
 
 def chain(system, tips):
     """Turns and slides from the base on: dual quaternions 1 + t h, h = a + eps o x a or eps a / 2. Three tips are the
-    platform's, behind the first of ``ends``; others are points, or arrows, that some joints carry. ``normals`` are
-    all that annul what the other part of a loop, without unknowns, can be, about at right angles to each other."""
-    n, joints, ((last,), *ends) = system["unknowns"], [(k, *rational(v)) for k, *v in system["joints"]], system["ends"]
-    t, halves, annul = [term(1, n, k) for k in range(n)], [j[0] == "R" for j in joints[:n]], rational(system["normals"])
+    platform's, behind the first of ``ends``; others are points, or arrows, that some joints carry."""
+    joints, ((last,), *ends) = [(kind, *rational(v)) for kind, *v in system["joints"]], system["ends"]
+    n, rows = len(joints), []
+    t, halves = [term(1, n, k) for k in range(n)], [joint[0] == "R" for joint in joints]
 
-    def carried(start, by):
+    def carried(start, end):
         e, g = [term(1, n), {}, {}, {}], [{}] * 4
-        for (kind, a, o), x in zip(joints[start:], by):
+        for (kind, a, o), x in list(zip(joints, t))[start:end]:
             turn, slide = (a, cross(o, a)) if kind == "R" else ([0] * 3, [c / 2 for c in a])
             p, q = [term(1, n), *(times(c, x) for c in turn)], [{}, *(times(c, x) for c in slide)]
             e, g = turned(e, p), [*map(add, turned(e, q), turned(g, p))]
@@ -279,40 +252,26 @@ def chain(system, tips):
 
     need(
         all(kind in ("R", "P") and dot(a, a) == 1 for kind, a, _ in joints)
-        and 0 < last <= n <= len(joints)
+        and 0 < last <= n
         and any(cross(sub(tips[1], tips[0]), sub(tips[2], tips[0]))),
         "turns and slides along vectors of length 1, a platform",
     )
-    rest = [
-        [sum(p.values()) * (-1) ** (k % 4 > 0) for k, p in enumerate(p for part in carried(n, by) for p in part)]
-        for by in product(({}, term(1, n)), repeat=len(joints) - n)
-    ]
-    all_ = [[*integral(dict(enumerate(v))).values()] for v in rest + annul if any(v)]
-    off = [u for u, v in combinations(annul, 2) if 64 * dot(u, v) ** 2 > dot(u, u) * dot(v, v)] + [
-        v for v in annul for x in rest if dot(v, x)
-    ]
-    need(
-        (len(joints) == n and not annul) or (not off and modular(all_, 0)[1] == 8),
-        "normals of the other part of a loop",
-    )
-    rows = [(add(*map(times, v, [*carried(0, t)[0], *carried(0, t)[1]])), v, {(*map(int, halves),): 1}) for v in annul]
     for b, (start, end, arrow), reach in zip(tips[3:], ends, map(reach_of, system["reaches"]), strict=True):
         need(
             0 <= start < end <= n and reach[0] in ("plane", "sphere")[: 2 - bool(arrow)],
             "the joints and locus of a tip",
         )
-        turn, point = placed(*carried(start, t[start:end]), b)
+        turn, point = placed(*carried(start, end), b)
         rows += [(*each, point[2]) for each in conditions((turn, {}, point[2]) if arrow else point, reach)]
-    points = [placed(*carried(0, by), b)[1] for by, b in zip([t[:last]] * 3 + [t], tips[:3] + tips[:1])]
+    points = [placed(*carried(0, end), b)[1] for end, b in zip([last] * 3 + [n], tips[:3] + tips[:1])]
     return [formal(p, w) for p, _, w in rows[:n]], halves, points, [misfits([row[:2]]) for row in rows[n:]]
 
 
 KINDS = {
     "spatial": (spatial, "square"),
-    "loops": (loops, "angles slides loops besides links others"),
     "shifting": (shifting, "square bodies slide"),
     "pose": (pose, "chart arrows hub"),
-    "chain": (chain, "joints unknowns ends normals"),
+    "chain": (chain, "joints ends"),
 }
 
 
@@ -430,26 +389,6 @@ def poses(equations, halves, system):
     return 8 if "point" in kinds or kinds <= {"line", "plane"} else 16 if kinds == {"sphere"} and together > 2 else 40
 
 
-def degrees(equations, halves, system):  # of loops and conjugates in u = cos + i sin, v = cos - i sin; u v = 1
-    groups, a, n = system["bound"]["groups"], system["angles"], len(halves)
-    need(n < 25 and all(groups) and sorted(k for group in groups for k in group) == [*range(n)], "each unknown once")
-    forms = [[[j, a + j]] for j in range(a)]  # the unknowns of each term, u before v before slides
-    forms += [
-        [
-            [j + a * (sign * k < 0) for j, k in enumerate(e) for _ in range(abs(k))] + [2 * a + slide] * (slide >= 0)
-            for _, slide, e in loop
-        ]
-        for loop in system["loops"]
-        for sign in (1, -1)
-    ]
-    total = term(1, len(groups))
-    for form in forms:
-        high = [max(sum(k in group for k in one) for one in form) for group in groups]
-        total = mul(total, add(*(term(c, len(groups), g) for g, c in enumerate(high))))
-        total = {e: c for e, c in total.items() if all(k <= len(group) for k, group in zip(e, groups))}
-    return sum(total.values()) or None  # no zero at all, or curves
-
-
 def modes(record):
     seen, proofs, real, complex_, closed, apart = [], [], 0, 0, 0, 0
     for system in record["systems"]:
@@ -460,7 +399,7 @@ def modes(record):
         need((equations, legs) not in seen, "a system that is given twice")
         boxes, counted, seen = [], [], [*seen, (equations, legs)]
         flat = [times(Fraction(1, 2 ** max(map(abs, p.values())).bit_length()), p) for p in equations]
-        bound = {"rank": rank, "poses": poses, "degrees": degrees}[system["bound"]["kind"]](equations, halves, system)
+        bound = {"rank": rank, "poses": poses}[system["bound"]["kind"]](equations, halves, system)
         need(len(system["boxes"]) == bound, f"{len(system['boxes'])} boxes, but there may be {bound} solutions")
         for each in system["boxes"]:
             m, r = rational(each["middle"]), rational(each["radius"])
@@ -474,7 +413,7 @@ def modes(record):
                 need(all(most_of(p, m, r) < FIT for leg in legs for p in leg), "a leg that misses")
                 need(finite and not away and all(v == 0 for _, v in m), "a real pose with a complex or far box")
                 told(system, each, points, tips, m, r)
-                closed += bool(system.get("normals") or "links" in each) and closes(record["assembly"], each["links"])
+                closed += "links" in each and closes(record["assembly"], each["links"])
             elif "misses" in each:
                 need(any(least(p, m, r) > 0 for p in legs[each["misses"]]), "a leg that may not miss")
             elif away:
@@ -482,9 +421,9 @@ def modes(record):
                 apart += any(map(any, (value(p, m) for p in equations))) or all(any(value(w, m)) for _, _, w in points)
             else:
                 need(any(abs(v) > r for _, v in m), "a box that may be real has no pose")
-                need(finite and not legs and not system.get("normals"), "a box that may or may not be a pose")
+                need(finite and not legs, "a box that may or may not be a pose")
             real, counted = real + ("pose" in each), counted + [(m, r)] * (not away and "misses" not in each)
-        own, complex_ = {"loops": points, "chain": points[:3]}.get(system["kind"], []), complex_ + len(counted)
+        own, complex_ = points[:3] if system["kind"] == "chain" else [], complex_ + len(counted)
         need(
             all(
                 any(differ(p, w, *one, *other) for N, _, w in own for p in N) or not own
@@ -505,7 +444,7 @@ def modes(record):
 def fair(system, tips):  # has its kind's keys; lengths in units of about its size (translation along planes: any)
     need(system.keys() <= {*f"kind reaches tips boxes bound places {KINDS[system['kind']][1]}".split()}, "another key")
     need(len(tips) < 50 and all(len(b) == 3 for b in tips), "tips of another dimension, or too many")
-    need(len(system.get("joints", ())) - 5 < system.get("unknowns", 0) < 9, "more than 8 unknowns, or 4 joints besides")
+    need(len(system.get("joints", ())) < 9, "more than 8 joints")
     reaches = [reach_of(each) for each in system["reaches"]]
     radii = [v[1] for kind, v in reaches if kind in ("circle", "sphere")]
     spans = [sub(b, places[0]) for places in (tips, [v[0] for _, v in reaches]) for b in places]

@@ -2,24 +2,27 @@
 
 A joint that only rotates and a held direction are linear in them, a slide is bilinear, and scalar products of a link's
 directions are constant (J. García de Jalón and E. Bayo, Kinematic and Dynamic Simulation of Multibody Systems, 1994,
-chapter 2). Lengths are in characteristic lengths.
+chapter 2). Two coupled rotations have one power of their complex units each, z₁ᵖ = z₂^q with p / q the ratio. Lengths
+are in characteristic lengths.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UnsupportedLocus
-from ..geometry.vectors import Array, invert_pose, transform
+from ..geometry.vectors import Array, find_perpendicular, invert_pose, transform
 from ..kinematics.configuration import ClosedConfiguration
-from ..mechanism import Direction, Joint, JointType, Observation
+from ..mechanism import Direction, Joint, JointType, Mechanism, Observation
+from ..mechanism.model import Coupling
 from ..mechanism.observations.encoder import Encoder
 from ..results import Value
-from ..tolerances import CHAIN_ROUNDING
+from ..tolerances import CHAIN_ROUNDING, GEAR_RATIO_MAX, GEOMETRY_DIFFERENCE_TOL
 
 SPANNED_DIRECTION_MIN = 1e-6
 """Directions of a link that differ by less are one; by how much they differ is part of the equations' error."""
@@ -60,6 +63,8 @@ class NaturalView(Value):
     groups
         Of each group of links that have one rotation: an orthonormal basis (3, d), at the goal, of the directions used,
         and the places (d, 3) of their images; None for the base's.
+    size
+        Bound of the distance of two points.
     """
 
     matrices: Array
@@ -68,6 +73,15 @@ class NaturalView(Value):
     farthest: Array
     links: dict[str, NaturalLink]
     groups: dict[str, tuple[Array, Places | None]]
+    size: float
+
+    def narrow(self, farthest: Array) -> NaturalView:
+        """Return the view with smaller bounds (n,) of the unknowns."""
+        farthest = np.minimum(self.farthest, farthest)
+        size = self.size - float(self.farthest.max(initial=1.0) - farthest.max(initial=1.0))
+        linear = ~np.any(self.matrices[:, 1:, 1:], axis=(1, 2))
+        errors = self.errors * np.where(linear, 1.0, size / self.size)
+        return replace(self, farthest=farthest, errors=errors, size=size)
 
     def direction(self, link: str, vector: Array) -> Array:
         """Rows (3, n + 1) of the image of a direction of a link, given at the goal."""
@@ -120,6 +134,30 @@ class _JointGeometry:
     axes: dict[tuple[str, str], list[Array]]
     held: list[tuple[str, Array]]
     locked: set[str]
+    gears: list[_Gear] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class _Gear:
+    """Coupling of two slides, or of two rotations with the ratio p / q; ``units``: a direction (3,) of both links of
+    each, at the goal, across its axis."""
+
+    driver: Joint
+    driven: Joint
+    ratio: float
+    p: int
+    q: int
+    units: tuple[Array, Array]
+
+    @property
+    def is_of_slides(self) -> bool:
+        """True for two slides."""
+        return self.driver.type is JointType.PRISMATIC
+
+    @property
+    def count(self) -> int:
+        """Number of unknowns: of each power of both units the real and the imaginary part."""
+        return 0 if self.is_of_slides else 2 * (abs(self.p) + self.q)
 
 
 def read_natural_view(
@@ -177,6 +215,9 @@ def read_natural_view(
         if link != geometry.base:
             places.append(origin)
             n += 3
+    for gear in geometry.gears:
+        places.append(np.tile([1.0, 0.0], gear.count // 2))
+        n += gear.count
     reach = _bound_reach(geometry, links)
     farthest = np.ones(n)
     for link, (_, _, triple) in links.items():
@@ -186,7 +227,7 @@ def read_natural_view(
     farthest *= 1.0 + REACH_MARGIN_FRACTION
     arms = [np.linalg.norm(at - links[link][1]) for (_, link), at in geometry.points.items()]
     size = 1.0 + float(farthest.max(initial=1.0)) + float(max(arms, default=0.0))
-    view = NaturalView(np.zeros((0, n + 1, n + 1)), np.zeros(0), np.concatenate(places), farthest, links, groups)
+    view = NaturalView(np.zeros((0, n + 1, n + 1)), np.zeros(0), np.concatenate(places), farthest, links, groups, size)
     matrices = np.array(list(_list_equations(view, geometry, unite, spinning)))
     off = error / length + goal.residual + CHAIN_ROUNDING + miss
     # two points and two directions; in products they are multiplied by what they are within
@@ -200,8 +241,6 @@ def _read(
 ) -> _JointGeometry:
     """Read joints at the goal, in each of their links; raises ``UnsupportedLocus``."""
     mechanism, length = goal.model.mechanism, goal.model.length
-    if mechanism.couplings:
-        raise UnsupportedLocus(mechanism.name, "couplings are not linear in points and directions")
     joints = [joint for joint in mechanism.joints.values() if joint.name not in left_out]
     names = [link for link in mechanism.links if any(link in joint.links for joint in joints)]
     moved = {link: goal.pose(link) @ invert_pose(mechanism.links[link].pose) for link in names}
@@ -223,10 +262,37 @@ def _read(
     part = [name for name, count in counts.items() if count < mechanism.joints[name].type.freedoms]
     if part or any(link not in names for link, _ in held):
         raise UnsupportedLocus(mechanism.name, "an observation holds a part of a joint")
+    locked = set(counts)
+    pairs = [{gear.driver, gear.driven} for gear in mechanism.couplings]
+    for _ in pairs:
+        locked.update(*(pair for pair in pairs if locked & pair))
     for joint in joints:
-        if joint.name in counts or joint.type is JointType.FIXED:  # one place of two links that move together
+        if joint.name in locked or joint.type is JointType.FIXED:  # one place of two links that move together
             points[joint.name, joint.successor] = points[joint.name, joint.predecessor]
-    return _JointGeometry(joints, names, mechanism.base, points, axes, held, set(counts))
+    geometry = _JointGeometry(joints, names, mechanism.base, points, axes, held, locked)
+    geometry.gears = [
+        _read_gear(geometry, mechanism, gear) for gear in mechanism.couplings if gear.driver not in locked
+    ]
+    return geometry
+
+
+def _read_gear(geometry: _JointGeometry, mechanism: Mechanism, coupling: Coupling) -> _Gear:
+    """Read a coupling of joints that are read; raises ``UnsupportedLocus``."""
+    both = mechanism.joints[coupling.driver], mechanism.joints[coupling.driven]
+    ratio = Fraction(coupling.ratio).limit_denominator(GEAR_RATIO_MAX)
+    kinds = {joint.type for joint in both}
+    if not {joint.name for joint in both} <= {joint.name for joint in geometry.joints}:
+        raise UnsupportedLocus(mechanism.name, f"coupling {coupling.name} is of a leg that holds nothing")
+    if kinds not in ({JointType.REVOLUTE}, {JointType.PRISMATIC}):
+        raise UnsupportedLocus(mechanism.name, f"coupling {coupling.name} joins a rotation and a translation")
+    is_whole = abs(float(ratio) - coupling.ratio) <= GEOMETRY_DIFFERENCE_TOL and 0 < abs(ratio) <= GEAR_RATIO_MAX
+    if kinds == {JointType.REVOLUTE} and not is_whole:
+        raise UnsupportedLocus(
+            mechanism.name,
+            f"coupling {coupling.name}: {coupling.ratio:g} is not a quotient of whole numbers up to {GEAR_RATIO_MAX}",
+        )
+    first, second = (find_perpendicular(geometry.axes[joint.name, joint.predecessor][0]) for joint in both)
+    return _Gear(*both, coupling.ratio, ratio.numerator, ratio.denominator, (first, second))
 
 
 def _list_used_directions(geometry: _JointGeometry, unite: dict[str, str]) -> tuple[dict[str, list[Array]], set[str]]:
@@ -242,6 +308,10 @@ def _list_used_directions(geometry: _JointGeometry, unite: dict[str, str]) -> tu
             used[unite[link]].append(at - origin.setdefault(link, at))
             if joint.type is not JointType.UNIVERSAL:
                 used[unite[link]] += geometry.axes[joint.name, link][:1]
+    for gear in geometry.gears:
+        for joint, unit in zip((gear.driver, gear.driven), gear.units, strict=True):
+            used[unite[joint.successor]].append(unit)
+            used[unite[joint.predecessor]] += [unit, np.cross(geometry.axes[joint.name, joint.predecessor][0], unit)]
     crosses = [
         (joint.name, unite[link], geometry.axes[joint.name, link][k])
         for joint in geometry.joints
@@ -313,9 +383,48 @@ def _list_equations(
     for link, direction in geometry.held:
         same = view.direction(link, direction) - write_rows(None, direction, n)
         yield from (build_product(unit, row[None]) for row in same)
+    place = n - sum(gear.count for gear in geometry.gears)
+    for gear in geometry.gears:
+        yield from _list_gear_equations(view, geometry, gear, place)
+        place += gear.count
     for basis, places in view.groups.values():
         if places is not None:
             yield from _list_rotation_equations(basis, [write_rows(triple, np.zeros(3), n) for triple in places], unit)
+
+
+def _list_gear_equations(view: NaturalView, geometry: _JointGeometry, gear: _Gear, place: int) -> Iterator[Array]:
+    """Yield that slides keep their ratio, or that powers of two rotations' complex units are one; unknowns from
+    ``place`` on."""
+    unit, rows = np.eye(1, len(view.goal) + 1), np.eye(len(view.goal) + 1)
+    if gear.is_of_slides:
+        moved = []
+        for joint in (gear.driver, gear.driven):
+            points = geometry.points[joint.name, joint.predecessor], geometry.points[joint.name, joint.successor]
+            axis = geometry.axes[joint.name, joint.predecessor][0]
+            gap = view.point(joint.successor, points[1]) - view.point(joint.predecessor, points[0])
+            along = float(axis @ (points[1] - points[0]))
+            moved.append(
+                build_product(view.direction(joint.predecessor, axis), gap) - along * build_product(unit, unit)
+            )
+        yield gear.ratio * moved[0] - moved[1]
+        return
+    ends = list[Array]()
+    for joint, u, power in zip((gear.driver, gear.driven), gear.units, (abs(gear.p), gear.q), strict=True):
+        axis = geometry.axes[joint.name, joint.predecessor][0]
+        powers = [rows[[place + 1 + 2 * k, place + 2 + 2 * k]] for k in range(power)]  # cosine, sine
+        place += 2 * power
+        turned = view.direction(joint.successor, u)
+        for across, row in zip((u, np.cross(axis, u)), powers[0], strict=True):
+            yield build_product(view.direction(joint.predecessor, across), turned) - build_product(unit, row[None])
+        flipped = np.array([[1.0], [-1.0]]) * powers[0]
+        for before, after in zip([np.vstack([unit, 0 * unit]), *powers], powers, strict=False):
+            yield build_product(after, after) - build_product(unit, unit)
+            for factor, first, second in ((powers[0], before, after), (flipped, after, before)):
+                yield build_product(factor * [[1.0], [-1.0]], first) - build_product(unit, second[:1])
+                yield build_product(factor[::-1], first) - build_product(unit, second[1:])
+        ends.append(powers[-1])
+    yield build_product(unit, ends[0][:1] - ends[1][:1])
+    yield build_product(unit, np.sign(gear.p) * ends[0][1:] - ends[1][1:])
 
 
 def _list_rotation_equations(basis: Array, columns: list[Array], unit: Array) -> Iterator[Array]:

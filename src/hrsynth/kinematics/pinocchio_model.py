@@ -19,7 +19,7 @@ from ..geometry.so3 import convert_rotations_to_vectors, decompose_rotation
 from ..geometry.vectors import Array, invert_pose, transform
 from ..mechanism import Joint, JointType, Mechanism, graphs
 from ..mechanism.screws import split_elementary
-from ..tolerances import GEOMETRY_DIFFERENCE_TOL
+from ..tolerances import CLOSURE_RESIDUAL_TOL, GEAR_RATIO_MAX, GEOMETRY_DIFFERENCE_TOL
 from .loop_rows import LoopRows, Places, read_numbers
 
 MODEL_COORDINATES_MAX = 256
@@ -328,7 +328,8 @@ class PinocchioModel:
         return self._masks[body]
 
     def read(self, pose: Callable[[str], Array]) -> Array:
-        """The configuration at which all links have their poses X_BL (4, 4), m, as far as the tree's joints allow."""
+        """The configuration at which all links have their poses X_BL (4, 4), m, as far as the tree's joints allow;
+        coupled rotations have the whole turns at which couplings close, if there are some."""
         D = {link: pose(link) @ invert_pose(each.pose) for link, each in self.mechanism.links.items()}
         step = np.zeros(self.nv)
         for joint, parent, _ in self._parts:
@@ -351,7 +352,32 @@ class PinocchioModel:
                     ]
                     turn = decompose_rotation(own.axis[None], R)[: len(places) - len(slides)]
                     step[places] = [*(axis @ shift for axis in slides), *turn]
-        return self.integrate(self.q0, step)
+        return self.integrate(self.q0, self._turn_coupled(step))
+
+    def _turn_coupled(self, step: Array) -> Array:
+        """Add whole turns to coupled rotations, as few as their couplings allow."""
+        couplings = self.mechanism.couplings
+        driven = {gear.driven for gear in couplings}
+        for root in dict.fromkeys(gear.driver for gear in couplings if gear.driver not in driven):
+            if self.mechanism.joints[root].type is JointType.REVOLUTE:
+                turns = sorted(range(-GEAR_RATIO_MAX, GEAR_RATIO_MAX), key=abs)
+                step = min(
+                    (self._turn_along(root, count, step) for count in turns),
+                    key=lambda tried: np.sum(np.abs(self._gears @ tried) > CLOSURE_RESIDUAL_TOL),
+                )
+        return step
+
+    def _turn_along(self, root: str, turns: int, step: Array) -> Array:
+        """Add whole turns to a rotation, and those that are nearest to closing to all that it drives."""
+        step, moved = step.copy(), [root]
+        step[self.coordinates[root]] += 2 * np.pi * turns
+        for name in moved:
+            for gear, row in zip(self.mechanism.couplings, self._gears, strict=True):
+                if gear.driver == name and self.mechanism.joints[gear.driven].type is JointType.REVOLUTE:
+                    place = self.coordinates[gear.driven][0]
+                    step[place] -= 2 * np.pi * np.round(row @ step / row[place] / (2 * np.pi))
+                    moved.append(gear.driven)
+        return step
 
     def integrate(self, q: Array, step: Array) -> Array:
         """The configuration that ``step`` (nv) leads to from ``q``."""

@@ -118,7 +118,11 @@ class QuadricSolver:
         if single is not None:
             k, step.weights, cases = single
             step.unknown, others = k, np.zeros((0, m))
-            for value, off in cases:
+            # where a real value is beyond its bound, the others may be complex
+            far = [
+                (complex(y), off) for y, off in cases if isinstance(y, float) and abs(y) - off > reduced.farthest[k - 1]
+            ]
+            for value, off in [*cases, *far]:
                 fixed = np.zeros((1, m + 1, m + 1), dtype=type(value))
                 fixed[0, 0, 0], fixed[0, 0, k], fixed[0, k, 0] = -value, 0.5, 0.5
                 more, besides = self.solve(np.vstack([matrices, fixed]), np.append(errors, off), reduced.farthest)

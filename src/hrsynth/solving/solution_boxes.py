@@ -34,6 +34,8 @@ INFLATION_FRACTION = 1e-6
 """By how much bounds are larger, relative to them: more than the rounding of their own sums."""
 NEGLECTED_MAX = 1e-3
 """Largest bound, relative to 1, of what is to be nearly zero."""
+SUMS_COUNT = 4
+"""Random sums of the unknowns that are tried until one separates all real solutions."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -165,8 +167,9 @@ def enclose_all_solutions(table: Array, errors: Array, farthest: Array) -> Confi
     farthest
         Bounds (m,) of |y| at each solution.
     """
+    sums = [_draw_sum(len(farthest), seed) for seed in range(SUMS_COUNT)]
     for multiples, quotient in _list_quotients(table, len(farthest)):
-        boxes = _enclose_all(multiples, quotient, errors, farthest)
+        boxes = _enclose_all(multiples, quotient, errors, farthest, sums)
         if boxes is not None:
             return boxes
     return None
@@ -176,7 +179,7 @@ def find_solutions(table: Array, m: int) -> Array | None:
     """Return all solutions (k, m) of quadrics with complex coefficients, from eigenvectors, without proof; None where
     they are not isolated."""
     first = next(_list_quotients(table, m), None)
-    return None if first is None else _read_points(first[1], np.linalg.eig(_sum_products(first[1], m))[1])
+    return None if first is None else _read_points(first[1], np.linalg.eig(_sum_products(first[1], _draw_sum(m, 0)))[1])
 
 
 def _list_quotients(table: Array, m: int) -> Iterator[tuple[Multiples, _QuotientAlgebra]]:
@@ -190,14 +193,15 @@ def _list_quotients(table: Array, m: int) -> Iterator[tuple[Multiples, _Quotient
             yield multiples, quotient
 
 
-def _sum_products(quotient: _QuotientAlgebra, m: int) -> Array:
-    """Return the matrix (K, K) of multiplication by a random sum of the unknowns."""
-    K = len(quotient.basis)
-    return np.asarray(np.einsum("i,ijk->jk", _draw_sum(m), quotient.C[: m * K].reshape(m, K, K)))
+def _sum_products(quotient: _QuotientAlgebra, r: Array) -> Array:
+    """Return the matrix (K, K) of multiplication by a sum of the unknowns."""
+    K, m = len(quotient.basis), len(r)
+    return np.asarray(np.einsum("i,ijk->jk", r, quotient.C[: m * K].reshape(m, K, K)))
 
 
-def _draw_sum(m: int) -> Array:
-    r = np.random.default_rng(0).normal(size=m)
+def _draw_sum(m: int, seed: int) -> Array:
+    """Return the weights (m,) of a random sum of the unknowns."""
+    r = np.random.default_rng(seed).normal(size=m)
     return np.asarray(r / np.linalg.norm(r))
 
 
@@ -209,10 +213,11 @@ def _read_points(quotient: _QuotientAlgebra, V: Array) -> Array:
 
 
 def _enclose_all(
-    multiples: Multiples, quotient: _QuotientAlgebra, errors: Array, farthest: Array
+    multiples: Multiples, quotient: _QuotientAlgebra, errors: Array, farthest: Array, sums: list[Array]
 ) -> Confinement | None:
-    """Return boxes from combinations of one degree; None where two cannot be separated, or bounds are too large."""
-    basis, C, m = quotient.basis, quotient.C, multiples.m
+    """Return boxes from combinations of one degree, by the first of the sums of the unknowns that separates all
+    real solutions; None where none does, or bounds are too large."""
+    basis, C = quotient.basis, quotient.C
     targets = np.zeros((len(C), multiples.rows.shape[1]))
     targets[np.arange(len(C)), quotient.places] = 1.0
     targets[:, basis] -= C
@@ -222,9 +227,20 @@ def _enclose_all(
     left = np.abs(weights @ multiples.rows - targets) + bound_rounding(len(multiples.rows)) * summing
     off = left @ sizes + np.abs(weights) @ (errors[multiples.quadrics] * sizes[multiples.factors])
     off *= 1.0 + INFLATION_FRACTION
-    K, sizes = len(basis), sizes[basis]
-    r, values = _draw_sum(m), C[m * K :]
-    M, within, off_values = _sum_products(quotient, m), np.abs(r) @ off[: m * K].reshape(m, K), off[m * K :]
+    return next(
+        (boxes for r in sums if (boxes := _separate(multiples, quotient, weights, off, sizes[basis], r)) is not None),
+        None,
+    )
+
+
+def _separate(
+    multiples: Multiples, quotient: _QuotientAlgebra, weights: Array, off: Array, sizes: Array, r: Array
+) -> Confinement | None:
+    """Return boxes from the eigenvectors of multiplication by a sum of the unknowns; ``off``: bounds of products less
+    their sums, ``sizes``: of the basis."""
+    basis, C, m = quotient.basis, quotient.C, multiples.m
+    K, values = len(basis), C[m * len(basis) :]
+    M, within, off_values = _sum_products(quotient, r), np.abs(r) @ off[: m * K].reshape(m, K), off[m * K :]
     eigenvalues, V = np.linalg.eig(M)
     try:
         W = np.linalg.inv(V)

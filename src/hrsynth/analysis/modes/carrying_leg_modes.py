@@ -15,7 +15,6 @@ from ...geometry.vectors import Array, cross, freeze_array, hat
 from ...kinematics.configuration import ClosedConfiguration
 from ...solving.krawczyk import Polynomial, enclose_zero
 from ...solving.newton import approach_zeros, collect_zeros
-from ...tolerances import LARGEST_LOOPS, PLANAR_STARTS
 from ..measured import MeasuredRobot
 from .branches import Model
 from .carrying_leg import carried_platform
@@ -37,6 +36,10 @@ from .solve import SystemMode, SystemModes
 
 RANDOM_START_JOINTS_MAX = 2
 """Joints up to which random starts find all zeros soon."""
+START_SETS_COUNT = 20
+"""Number of sets of 64 random starts."""
+CLOSURES_MAX = 120
+"""Largest number of solutions that are searched for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +100,7 @@ def measure_joint_distances(slides: Array, x: Array, y: Array) -> Array:
 def proposals(system: CarriedPlatform, most: int) -> Array:
     """Common zeros (k, n) that Newton's method finds from random complex starts, each with its conjugate."""
     rng, n = np.random.default_rng(0), len(system.freedoms_)
-    starts = (rng.uniform(-np.pi, np.pi, (64, n)) + 3j * rng.normal(size=(64, n)) for _ in range(PLANAR_STARTS))
+    starts = (rng.uniform(-np.pi, np.pi, (64, n)) + 3j * rng.normal(size=(64, n)) for _ in range(START_SETS_COUNT))
     return polish_zeros(system, starts, most)
 
 
@@ -174,8 +177,8 @@ def _judge(system: CarriedPlatform) -> SystemModes:
 
     n, most = len(system.freedoms_), system.most(system.square)
     size = f"{n} joint{'s' * (n > 1)} of the leg that carries the platform"
-    if most > LARGEST_LOOPS:
-        raise ExternalSolverFailure("the leg", f"{size}: up to {most} solutions, too many (at most {LARGEST_LOOPS})")
+    if most > CLOSURES_MAX:
+        raise ExternalSolverFailure("the leg", f"{size}: up to {most} solutions, too many (at most {CLOSURES_MAX})")
     why, bound = "degrees in each (Bézout)", "class"
     boxes = enclose_zeros(system, proposals(system, most)) if n <= RANDOM_START_JOINTS_MAX else []
     if len(boxes) < most and (counted := closings_bound(system, system.square)) is not None:

@@ -9,10 +9,13 @@ from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.pinocchio_model import PinocchioModel
 from ...kinematics.tasks import FixedValuesTask, Task, stack_task
-from ...tolerances import CHAIN_ROUNDING, MOVED_AXIS_LEVER_MAX
+from ...mechanism import Direction, JointType, Mechanism
+from ...tolerances import CHAIN_ROUNDING, DIRECTION_SINE_TOL, MOVED_AXIS_LEVER_MAX
 
 ROTATION_LEVER_MIN = 2.0
 """Least lever (characteristic lengths) of a turn: directions are compared with the size of the tips' curves."""
+OUT_OF_PLANE_COUNT = 3
+"""Conditions of each loop of a planar mechanism that hold for all positions of its joints."""
 
 
 def drift(goal: ClosedConfiguration, pose: Task | None = None, moved: float = 0.0) -> float:
@@ -43,13 +46,26 @@ def drift(goal: ClosedConfiguration, pose: Task | None = None, moved: float = 0.
 
 def is_proved_to_exist(at: ClosedConfiguration, held: FixedValuesTask, moved: float) -> bool:
     """Return True if an exact closed configuration with held values is proved near one: as :func:`drift`, with all rows
-    independent but those that a unit vector repeats."""
+    independent but those that a unit vector repeats, and those that hold a planar mechanism in its plane."""
     model = at.model
     F, J = stack_task(model, at.q, held)
     rank = len(model.jacobian(at.q)) + sum(observation.rank for observation, _ in held.measured)
+    if is_planar(model.mechanism):
+        rank -= OUT_OF_PLANE_COUNT * len(model.loops) + sum(isinstance(each, Direction) for each, _ in held.measured)
     values, extent = np.linalg.svd(J, compute_uv=False), _measure_extent(model)
     miss = float(np.linalg.norm(F)) + CHAIN_ROUNDING * extent + MOVED_AXIS_LEVER_MAX * moved / model.length
     return 0 < rank <= len(values) and bool(model.nv * extent * miss <= values[rank - 1] ** 2 / 2)
+
+
+def is_planar(mechanism: Mechanism) -> bool:
+    """Return True if all rotations are about one direction, and all slides across it."""
+    joints = [joint for joint in mechanism.joints.values() if joint.type is not JointType.FIXED]
+    normal = next((joint.axis for joint in joints if joint.type is JointType.REVOLUTE), None)
+    return normal is not None and all(
+        (joint.type is JointType.REVOLUTE and float(np.linalg.norm(np.cross(joint.axis, normal))) <= DIRECTION_SINE_TOL)
+        or (joint.type is JointType.PRISMATIC and abs(float(joint.axis @ normal)) <= DIRECTION_SINE_TOL)
+        for joint in joints
+    )
 
 
 def _measure_extent(model: PinocchioModel) -> float:

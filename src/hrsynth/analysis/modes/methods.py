@@ -1,11 +1,10 @@
-"""Methods that list modes: by tips, by conditions on the pose, by loops, by a leg that carries the platform."""
+"""Methods that list modes by tips, and what decides among methods."""
 
 from __future__ import annotations
 
 import sys
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -18,10 +17,8 @@ from ...mechanism.sensors import make_encoders
 from ..measured import MeasuredRobot
 from ..observed import ObservedRobot
 from .branches import Model, solve_all
-from .carrying_leg_modes import solve_carried
 from .conditions import AtAngle
 from .observation_loci import all_loci
-from .planar_modes import solve_loops
 from .pose_conditions_solver import PosedPlatform, most_posed, solve_posed
 from .solve import SystemModes
 
@@ -66,15 +63,11 @@ def without_couplings(
     return (found, at) if found.rank == loose.dof and loose.decomposition.labels == setup.decomposition.labels else None
 
 
-def better_ways(made: Model) -> tuple[Any, ...]:
-    """Ways that may count complex modes too where a list is that of a part of the conditions on the pose, as the sense
-    of an axis is known besides."""
+def may_count_more(made: Model) -> bool:
+    """Return True if a list is that of a part of the conditions on the pose, as the sense of an axis is known besides:
+    another way may count complex modes too."""
     system = made.system
-    senses = sum(isinstance(c, AtAngle) and c.h == 1.0 for c in getattr(system, "conditions", ()))
-    if not isinstance(system, PosedPlatform) or not senses:
-        return ()
-    few = len(system.conditions) - senses <= system.poses.freedoms
-    return (solve_loops, solve_carried) if few else (solve_loops,)
+    return isinstance(system, PosedPlatform) and any(isinstance(c, AtAngle) and c.h == 1.0 for c in system.conditions)
 
 
 def solve_tips(

@@ -36,16 +36,13 @@ from .branches import MODES_TIME_LIMIT_S, Model
 from .carrying_leg_modes import solve_carried
 from .carrying_leg_system import CarriedPlatform
 from .formation_modes import formation_modes
-from .goal_error import drift
-from .methods import better_ways, solve_tips, without_couplings
+from .goal_error import drift, is_planar
+from .methods import may_count_more, solve_tips, without_couplings
 from .natural_modes import NaturalPlatform, prove_existence, solve_natural
 from .near import NearMode, measurement_bound, near_modes, poses_alike
-from .planar_loops import PlanarLoops
-from .planar_modes import solve_loops
 from .pose_conditions_solver import PosedPlatform, solve_posed
 from .search import FoundMode, has_unobserved_motion, search
 from .self_motions import SelfMotion, self_motion
-from .single_loop import solve_loop
 from .solve import SystemModes, continuum
 from .tips import TipLoci
 
@@ -155,7 +152,7 @@ class AssemblyModes(Result, shown_as="modes"):
             system.poses.motion
             if isinstance(system, PosedPlatform)
             else "planar"
-            if isinstance(system, PlanarLoops)
+            if isinstance(system, NaturalPlatform) and is_planar(self.goal.model.mechanism)
             else "kept"
             if isinstance(system, NaturalPlatform) and system.kept
             else "spatial"
@@ -320,9 +317,9 @@ def modes(
     Notes
     -----
     The modes are the solutions of the conditions y(x) = y(x₀) on the pose x, y the measured values, x₀ the goal
-    (proofs.md 8; MMT 3.3, 4.1.2, 4.2). A Π stays a parallelogram, never crossed, except in planar mechanisms that are
-    closed loop by loop, and in searches. If legs or values keep the platform from rotating, poses with another rotation
-    (another operation mode) are not sought.
+    (proofs.md 8; MMT 3.3, 4.1.2, 4.2). A Π stays a parallelogram, never crossed, except in natural coordinates and in
+    searches. If legs or values keep the platform from rotating, poses with another rotation (another operation mode)
+    are not sought.
 
     If loci are of an unknown kind, or a solver gives up or is not installed, the whole robot is closed from random
     starts (:mod:`.search`): these modes are found, and may not be all. The same is done if modes are on a self-motion:
@@ -556,36 +553,33 @@ def _modes_by_system(
     time_limit: float,
 ) -> AssemblyModes:
     """List the modes as the solutions of the system of the tips' loci, or else of the conditions of the legs'
-    joints."""
-    reasons, large = list[UnsupportedLocus | ExternalSolverFailure | TooLarge | MissingExtra](), None
+    joints, or else in natural coordinates."""
+    reasons = list[UnsupportedLocus | ExternalSolverFailure | TooLarge | MissingExtra]()
     answers = list[tuple[Model, SystemModes]]()
-    exact, better = drift(goal, wanted, setup.normal.moved), None
+    exact = drift(goal, wanted, setup.normal.moved)
     free = without_couplings(measured, goal)
     tips, asked, natural = (
         partial(solve_tips, as_written=as_written, time_limit=time_limit),
         partial(solve_posed, time_limit=time_limit),
         partial(solve_natural, time_limit=time_limit),
     )
-    first = (tips, asked, solve_loops) if free is None else (solve_loops, tips, asked)
-    for listed in (*first, solve_carried, solve_loop, natural):
-        if better is not None and listed not in better:
-            continue
-        if listed is not solve_loops and not setup.decomposition.is_platform_decided:
+    ways = (natural, tips, asked, solve_carried) if free else (tips, asked, natural, solve_carried)
+    for way in ways:
+        if way is not natural and not setup.decomposition.is_platform_decided:
             reasons.append(UnsupportedLocus(setup.robot.name, "joints inside its platform allow several poses of it"))
             continue
         try:
-            answers.append(listed(*((measured, goal) if free is None or listed is solve_loops else free), exact))
+            answers.append(way(*(free if free and way is not natural else (measured, goal)), exact))
         except (UnsupportedLocus, ExternalSolverFailure, TooLarge, MissingExtra) as error:
             reasons.append(error)
-            large = error if listed is solve_loops and isinstance(error, ExternalSolverFailure) else large
         else:
-            if answers[-1][1].complete:
-                better = () if better else better_ways(answers[-1][0])
+            if answers[-1][1].complete and not may_count_more(answers[-1][0]):
+                break
     if not answers:
-        raise large or reasons[0]
+        raise reasons[0]
     # all dof are observed: a continuous family is that of legs which tips alone do not show
     made, found = max(
-        answers, key=lambda each: (each[1].complete, each[1].continuous_family is None, not better_ways(each[0]))
+        answers, key=lambda each: (each[1].complete, each[1].continuous_family is None, not may_count_more(each[0]))
     )
     if free is not None and made.closing is None:
         found = replace(found, proof=f"without couplings, which only exclude poses: {found.proof}")

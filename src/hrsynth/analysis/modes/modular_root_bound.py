@@ -10,8 +10,7 @@ zeros, multiple ones counted so often, and no curve of zeros. A rank modulo a pr
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from itertools import product
 from typing import Any
@@ -24,12 +23,6 @@ CAP_OF_MULTIPLES, LARGEST_MULTIPLES = 4, 250
 """Largest degree in a group of unknowns, and number of monomials, of a bound by multiples of quadrics."""
 
 PRIME = (1 << 62) - 87
-ROOT = pow(5, (PRIME - 1) // 4, PRIME)
-"""A square root of -1 modulo the prime."""
-
-LOOP_UNKNOWN_GROUPINGS_MAX = 3
-"""Ways to group the unknowns of loops that are tried."""
-
 Form = dict[tuple[int, ...], Any]
 """Coefficients, fractions or residues, by exponents."""
 
@@ -50,74 +43,12 @@ def most_zeros(quadrics: Sequence[Quadric], enough: int) -> int | None:
         {tuple(e[k] for k in left): int(c * math.lcm(*(d.denominator for d in form.values()))) for e, c in form.items()}
         for form in forms
     ]
-    return _least(flat, partitions(list(range(len(left)))), enough) if left else 1
-
-
-def _least(forms: Sequence[Form], groupings: Iterable[Sequence[Sequence[int]]], enough: int) -> int | None:
-    """The least bound by ranks of multiples, the first that is ``enough``, of some ways to group the unknowns."""
     best: int | None = None
-    for groups in groupings:
-        best = min((each for each in (best, _least_bound(forms, groups, enough)) if each is not None), default=None)
+    for groups in partitions(list(range(len(left)))):
+        best = min((each for each in (best, _least_bound(flat, groups, enough)) if each is not None), default=None)
         if best is not None and best <= enough:
             break
-    return best
-
-
-@dataclass(frozen=True, eq=False)
-class Residues:
-    """Polynomials modulo the prime, those of degree one used to eliminate as many unknowns; n are left."""
-
-    forms: tuple[Form, ...]
-    n: int
-
-    @classmethod
-    def of(cls, forms: Sequence[Mapping[tuple[int, ...], complex]]) -> Residues:
-        """Return the reduction of polynomials with complex coefficients, which are taken as they are."""
-        from flint import nmod
-
-        def residue(c: complex) -> Any:
-            (a, b), (x, y) = c.real.as_integer_ratio(), c.imag.as_integer_ratio()
-            return nmod(a, PRIME) / nmod(b, PRIME) + nmod(ROOT, PRIME) * nmod(x, PRIME) / nmod(y, PRIME)
-
-        made: list[Form] = [{e: residue(c) for e, c in form.items() if c} for form in forms]
-        left = list(range(len(next(iter(made[0])))))
-        while pivots := [
-            (sum(any(e[k] for e in other) for other in made), len(form), k, i)
-            for i, form in enumerate(made)
-            if all(sum(e) <= 1 for e in form)
-            for k in left
-            if _at(form, k)
-        ]:
-            *_, k, i = min(pivots)  # the unknown that is in the fewest
-            made = [_without(form, made[i], k) for form in made if form is not made[i]]
-            left.remove(k)
-        return cls(tuple({tuple(e[k] for k in left): int(c) for e, c in form.items()} for form in made), len(left))
-
-    def most_by_degrees(self) -> int:
-        """The least number of isolated zeros, multiple ones counted so often, that the degrees in groups of unknowns
-        allow (Bézout's theorem in a product of projective spaces)."""
-        return min(bezout(self.forms, groups) for groups in partitions(list(range(self.n))))
-
-    def most_by_ranks(self, enough: int) -> int | None:
-        """The least bound by ranks of multiples, the first that is ``enough``, in the groups of the least degrees."""
-        groupings = sorted(partitions(list(range(self.n))), key=lambda groups: bezout(self.forms, groups))
-        return _least(self.forms, groupings[:LOOP_UNKNOWN_GROUPINGS_MAX], enough) if self.n else 1
-
-
-def bezout(forms: Sequence[Form], groups: Sequence[Sequence[int]]) -> int:
-    """The coefficient of the product of all hₖ to the number of unknowns in group k, in that of Σ dₖ hₖ for each
-    polynomial, dₖ its degree in the group."""
-    ways = {(0,) * len(groups): 1}
-    for form in forms:
-        degrees = [max((sum(e[k] for k in group) for e in form), default=0) for group in groups]
-        total = dict[tuple[int, ...], int]()
-        for used, count in ways.items():
-            for k, degree in enumerate(degrees):
-                if degree and used[k] < len(groups[k]):
-                    key = (*used[:k], used[k] + 1, *used[k + 1 :])
-                    total[key] = total.get(key, 0) + count * degree
-        ways = total
-    return sum(ways.values())
+    return best if left else 1
 
 
 def combine_quadrics(quadrics: Sequence[Quadric]) -> list[Quadric]:

@@ -5,17 +5,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from ...constraints.pattern import list_placing_links
 from ...equations.natural_view import SLIDE_REACH_MAX, NaturalView, read_natural_view
 from ...errors import ExternalSolverFailure, LoopClosureFailure, TooLarge, UnsupportedLocus
-from ...geometry.vectors import Array, build_pose, compare_poses, freeze_array
+from ...geometry.vectors import Array, build_pose, compare_poses, freeze_array, transform
 from ...kinematics.assembly import build_from_link_poses
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.tasks import FixedValuesTask
 from ...kinematics.velocity_relation import ObservationModel
+from ...mechanism import Direction, Mechanism
 from ...mechanism.observations.encoder import Encoder
 from ...solving.quadric_solver import QuadricSolver, SolutionBox
 from ...solving.uniqueness import enclose_unique, evaluate_quadrics, is_excluded
@@ -23,19 +25,21 @@ from ..measured import MeasuredRobot
 from .assembly_mode import AssemblyMode
 from .branches import MODES_TIME_LIMIT_S, Model
 from .constrained_platform import System
-from .goal_error import is_proved_to_exist
+from .goal_error import is_planar, is_proved_to_exist
 from .solve import SystemMode, SystemModes
 
 NATURAL_TIME_S = 5.0
 """Estimated time of one list (s)."""
-LEG_DOF_MIN = 6
-"""Least dof of a leg that holds nothing of the platform."""
+LEG_DOF_MIN, PLANAR_LEG_DOF_MIN = 6, 3
+"""Least dof of a leg that holds nothing of the platform, and of one of a planar mechanism."""
 SAME_POSE_TOL = 1e-6
 """Difference (characteristic lengths, entries of rotations) up to which poses are listed as one."""
 ROTATION_SPREAD_MAX = 1e-8
 """Change of a direction over the samples up to which none turns it."""
 GOAL_ISOLATED_MIN = 1e-9
 """Smallest singular value of the equations at the goal, over the largest, where it is isolated."""
+NARROWER_MAX = 0.5
+"""Size of what all boxes lie in, over that of the bounds, up to which a list is computed again within it."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -47,6 +51,8 @@ class NaturalPlatform(System):
     links: tuple[str, ...]
     kept: bool
     """True if directions that no sample turns are held."""
+    point: Array | None = None
+    """The platform, if it is a point (3,) of its link, in the link's frame (m)."""
 
     freedoms = 6
 
@@ -56,7 +62,7 @@ class NaturalPlatform(System):
         return self.goal.model.length
 
     def place(self, link: str, x: Array) -> Array:
-        """Return the pose (4, 4) of a link at x."""
+        """Return the pose (4, 4) of a link at x; of one with a single direction one of those with its image."""
         group, origin, _ = self.view.links[link]
         basis = self.view.groups[group][0]
         values = np.append(1.0, x)
@@ -69,6 +75,10 @@ class NaturalPlatform(System):
         moved = build_pose(self.size * (place - R @ origin), R)
         return np.asarray(moved @ self.goal.pose(link))
 
+    def close(self, x: Array) -> ClosedConfiguration:
+        """Return the robot with all its links, coupled joints at the turns at which couplings close."""
+        return build_from_link_poses(self.goal.model, partial(self.place, x=x))
+
     def place_all(self, x: Array) -> dict[str, Array]:
         """Return the poses (4, 4) of the links that place the platform."""
         return {link: self.place(link, x) for link in self.links}
@@ -76,10 +86,13 @@ class NaturalPlatform(System):
     def compare(self, x: Array, y: Array) -> float:
         """Return the largest difference of poses at x and y (characteristic lengths, entries of rotations)."""
         pairs = zip(self.place_all(x).values(), self.place_all(y).values(), strict=True)
-        return max(compare_poses(X, Y, self.size) for X, Y in pairs)
+        return max(compare_poses(X, Y, self.size, self.point) for X, Y in pairs)
 
     def list_pose_rows(self) -> Array:
         """Return the rows (k, n + 1) of points and images of directions of the links that place the platform."""
+        if self.point is not None:
+            (link,) = self.links
+            return self.view.point(link, transform(self.goal.pose(link), self.point) / self.size)
         rows = list[Array]()
         for link in self.links:
             group, origin, _ = self.view.links[link]
@@ -136,26 +149,42 @@ def solve_natural(
 def _read(measured: MeasuredRobot, goal: ClosedConfiguration, error: float, kept: bool) -> NaturalPlatform:
     """Return the robot without legs that hold nothing."""
     setup, model = measured.setup, measured.observation_model
-    mechanism, name = goal.model.mechanism, setup.robot.name
-    if setup.decomposition.point is not None or model.reference != mechanism.base:
-        raise UnsupportedLocus(name, "its platform is a point, or seen from a link that is not its base")
+    mechanism, name, point = goal.model.mechanism, setup.robot.name, setup.decomposition.point
+    if model.reference != mechanism.base:
+        raise UnsupportedLocus(name, "its platform is seen from a link that is not its base")
     joints = {seen.joint for seen in model.observations if isinstance(seen, Encoder)}
     links = {seen.link for seen in model.observations}
+    least = PLANAR_LEG_DOF_MIN if is_planar(mechanism) else LEG_DOF_MIN
     free_legs = [
         leg
         for leg in setup.decomposition.legs
         if not joints & {*leg.joints}
         and not links & {*leg.links}
-        and sum(mechanism.joints[joint].type.freedoms for joint in leg.joints) >= LEG_DOF_MIN
+        and sum(mechanism.joints[joint].type.freedoms for joint in leg.joints) >= least
     ]
-    left_out = {joint for leg in free_legs for joint in leg.joints}
+    left_out = {joint for leg in free_legs for joint in leg.joints} | _list_hanging(measured, mechanism)
     directions = _list_kept_directions(measured, goal, left_out) if kept else []
     view = read_natural_view(goal, model.observations, left_out, directions, error)
     bodies = list_placing_links(setup.decomposition)
-    for link in bodies:
-        if link not in view.links or view.groups[view.links[link][0]][0].shape[1] < 2:
+    for link in mechanism.links if mechanism.couplings else bodies:
+        if link not in view.links or view.groups[view.links[link][0]][0].shape[1] < 2 - (point is not None):
             raise UnsupportedLocus(name, f"the joints do not place {link}")
-    return NaturalPlatform((), np.zeros((0, 3)), goal, view, bodies, kept, error=error)
+    return NaturalPlatform((), np.zeros((0, 3)), goal, view, bodies, kept, point, error=error)
+
+
+def _list_hanging(measured: MeasuredRobot, mechanism: Mechanism) -> set[str]:
+    """Return joints of what hangs on links that place the platform, or on the base, and holds nothing of it."""
+    if mechanism.couplings:
+        return set()
+    import networkx as nx
+
+    base, bodies = mechanism.base, list_placing_links(measured.setup.decomposition)
+    graph = nx.Graph(joint.links for joint in mechanism.joints.values())
+    seen = [each.link for each in measured.observation_model.observations if isinstance(each, Direction)]
+    graph.add_edges_from((base, link) for link in (*bodies, *seen))
+    parts: list[set[str]] = list(map(set, nx.biconnected_components(graph)))  # type: ignore[arg-type]
+    parts = [part for part in parts if any({base, body} <= part for body in bodies)]
+    return {joint.name for joint in mechanism.joints.values() if not any(set(joint.links) <= part for part in parts)}
 
 
 def _list_kept_directions(
@@ -177,12 +206,22 @@ def _list_kept_directions(
 
 def _solve(system: NaturalPlatform) -> tuple[Model, SystemModes]:
     """Return the modes, each pose once, the goal first."""
-    view, solver = system.view, QuadricSolver()
-    if not _is_isolated(view):
+    if not _is_isolated(system.view):
         raise ExternalSolverFailure("natural coordinates", "the goal is not isolated, to rounding")
-    boxes, others = solver.solve(view.matrices, view.errors, view.farthest)
-    n, m = len(view.goal), solver.left
-    modes, unique = list[SystemMode](), _list_unique(view, boxes)
+    is_reach_assumed = bool(np.any(system.view.farthest >= SLIDE_REACH_MAX))
+    for narrowed in (False, True):
+        view, solver = system.view, QuadricSolver()
+        boxes, others = solver.solve(view.matrices, view.errors, view.farthest)
+        unique = _list_unique(view, boxes)
+        if unique is not None:
+            break
+        # within smaller bounds errors are smaller
+        narrower = view.narrow(np.max([np.abs(box.middle) + box.radii for box in boxes], axis=0))
+        if narrowed or narrower.size > NARROWER_MAX * view.size:
+            raise ExternalSolverFailure("natural coordinates", "a box may hold several solutions")
+        system = replace(system, view=narrower)
+    assert unique is not None
+    n, m, modes = len(view.goal), solver.left, list[SystemMode]()
     for x, radii in unique:
         shift, turn = system.bound_shift(radii)
         close = [k for k, mode in enumerate(modes) if system.compare(mode.q, x) < SAME_POSE_TOL]
@@ -215,14 +254,16 @@ def _solve(system: NaturalPlatform) -> tuple[Model, SystemModes]:
     count = system.count_poses([*(mode.q for mode in modes), *others])
     proof = (
         f"{n} coordinates of points and directions, {m} of them left by linear equations: all real solutions"
-        + f" within {SLIDE_REACH_MAX:g} characteristic lengths" * bool(np.any(view.farthest >= SLIDE_REACH_MAX))
+        + f" within {SLIDE_REACH_MAX:g} characteristic lengths" * is_reach_assumed
         + f" are in {len(boxes)} box{'es' * (len(boxes) != 1)}"
         + f" of {solver.cases} cases" * (solver.cases > 1)
         + f", by combinations of the equations up to degree {solver.degree}" * bool(solver.degree)
         + f", with errors bounded; {len(modes)} pose{'s' * (len(modes) != 1)}; complex ones are found, {count} in all"
     )
     listed = SystemModes(count, tuple(modes), True, proof, bound="combinations", enclosed=len(modes) == len(unique))
-    return Model(system, system.place_all, view.goal), listed
+    # legs that are closed one by one need not meet couplings
+    coupled = system.goal.model.mechanism.couplings
+    return Model(system, system.place_all, view.goal, closing=system.close if coupled else None), listed
 
 
 def _is_isolated(view: NaturalView) -> bool:
@@ -231,16 +272,16 @@ def _is_isolated(view: NaturalView) -> bool:
     return len(s) == len(view.goal) and bool(s[-1] > GOAL_ISOLATED_MIN * s[0])
 
 
-def _list_unique(view: NaturalView, boxes: Sequence[SolutionBox]) -> list[tuple[Array, Array]]:
-    """Return middles and radii of boxes that hold one solution at most, without those that hold none; raises
-    ``ExternalSolverFailure``."""
+def _list_unique(view: NaturalView, boxes: Sequence[SolutionBox]) -> list[tuple[Array, Array]] | None:
+    """Return middles and radii of boxes that hold one solution at most, without those that hold none; None where one
+    may hold several."""
     unique = list[tuple[Array, Array]]()
     for box in boxes:
         if is_excluded(view.matrices, view.errors, box.middle, box.radii):
             continue
         smaller = enclose_unique(view.matrices, view.errors, box.middle, box.radii)
         if smaller is None:
-            raise ExternalSolverFailure("natural coordinates", "a box may hold several solutions")
+            return None
         if not is_excluded(view.matrices, view.errors, *smaller):
             unique.append(smaller)
     return unique
