@@ -63,6 +63,8 @@ class NaturalView(Value):
     groups
         Of each group of links that have one rotation: an orthonormal basis (3, d), at the goal, of the directions used,
         and the places (d, 3) of their images; None for the base's.
+    is_length
+        Whether unknowns are coordinates of points, shape (n,).
     size
         Bound of the distance of two points.
     """
@@ -73,14 +75,19 @@ class NaturalView(Value):
     farthest: Array
     links: dict[str, NaturalLink]
     groups: dict[str, tuple[Array, Places | None]]
+    is_length: NDArray[np.bool_]
     size: float
+
+    @property
+    def has_products_of_lengths(self) -> NDArray[np.bool_]:
+        """Whether an equation has a product with a point, shape (N,)."""
+        return np.any(self.matrices[:, 1:, 1:][:, self.is_length], axis=(1, 2))
 
     def narrow(self, farthest: Array) -> NaturalView:
         """Return the view with smaller bounds (n,) of the unknowns."""
         farthest = np.minimum(self.farthest, farthest)
         size = self.size - float(self.farthest.max(initial=1.0) - farthest.max(initial=1.0))
-        linear = ~np.any(self.matrices[:, 1:, 1:], axis=(1, 2))
-        errors = self.errors * np.where(linear, 1.0, size / self.size)
+        errors = self.errors * np.where(self.has_products_of_lengths, size / self.size, 1.0)
         return replace(self, farthest=farthest, errors=errors, size=size)
 
     def direction(self, link: str, vector: Array) -> Array:
@@ -219,21 +226,20 @@ def read_natural_view(
         places.append(np.tile([1.0, 0.0], gear.count // 2))
         n += gear.count
     reach = _bound_reach(geometry, links)
-    farthest = np.ones(n)
+    farthest, is_length = np.ones(n), np.zeros(n, dtype=bool)
     for link, (_, _, triple) in links.items():
         if triple is not None:
-            farthest[triple] = reach[link]
+            farthest[triple], is_length[triple] = reach[link], True
     farthest[~np.isfinite(farthest)] = SLIDE_REACH_MAX
     farthest *= 1.0 + REACH_MARGIN_FRACTION
     arms = [np.linalg.norm(at - links[link][1]) for (_, link), at in geometry.points.items()]
     size = 1.0 + float(farthest.max(initial=1.0)) + float(max(arms, default=0.0))
-    view = NaturalView(np.zeros((0, n + 1, n + 1)), np.zeros(0), np.concatenate(places), farthest, links, groups, size)
+    view = NaturalView(np.zeros((0, n + 1, n + 1)), np.zeros(0), np.concatenate(places), farthest, links, groups, is_length, size)
     matrices = np.array(list(_list_equations(view, geometry, unite, spinning)))
     off = error / length + goal.residual + CHAIN_ROUNDING + miss
+    view = replace(view, matrices=matrices)
     # two points and two directions; in products they are multiplied by what they are within
-    linear = ~np.any(matrices[:, 1:, 1:], axis=(1, 2))
-    errors = off * np.where(linear, 4.0, 4.0 * size)
-    return replace(view, matrices=matrices, errors=errors)
+    return replace(view, errors=4.0 * off * np.where(view.has_products_of_lengths, size, 1.0))
 
 
 def _read(

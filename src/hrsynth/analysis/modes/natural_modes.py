@@ -164,7 +164,9 @@ def _read(measured: MeasuredRobot, goal: ClosedConfiguration, error: float, kept
     ]
     left_out = {joint for leg in free_legs for joint in leg.joints} | _list_hanging(measured, mechanism)
     directions = _list_kept_directions(measured, goal, left_out) if kept else []
-    view = read_natural_view(goal, model.observations, left_out, directions, error)
+    # at zero joints have one place in both links, so loops are closed exactly
+    is_exact = setup.normal.moved == 0.0 and np.array_equal(goal.q, goal.model.q0)
+    view = read_natural_view(goal, model.observations, left_out, directions, 0.0 if is_exact else error)
     bodies = list_placing_links(setup.decomposition)
     for link in mechanism.links if mechanism.couplings else bodies:
         if link not in view.links or view.groups[view.links[link][0]][0].shape[1] < 2 - (point is not None):
