@@ -35,7 +35,7 @@ def value_at(view: NaturalView, goal: ClosedConfiguration, at: ClosedConfigurati
 def check(listed: AssemblyModes, starts: int) -> int:
     """Check the equations and the bounds where random starts close the robot; the number of these."""
     measured, goal = MeasuredRobot.of(listed.setup, listed.kind == "real"), listed.goal
-    view = read_natural_view(goal, measured.observation_model.observations, (), (), 1e-12)
+    view = read_natural_view(goal, measured.observation_model.observations, goal.model.mechanism.base, (), (), 1e-12)
     assert np.abs(evaluate_quadrics(view.matrices, view.goal)[0]).max() < 1e-9
     found = closings(listed, starts)
     for at in found:
@@ -77,6 +77,6 @@ def test_an_equation_holds_what_a_joint_holds():
     assert isinstance(system, NaturalPlatform)
     _, J = evaluate_quadrics(system.view.matrices, system.view.goal)
     assert np.linalg.svd(J, compute_uv=False)[-1] > 1e-3
-    some = read_natural_view(setup.all_samples.start, measured.observation_model.observations[:2], (), (), 0.0)
+    some = read_natural_view(setup.all_samples.start, measured.observation_model.observations[:2], "base", (), (), 0.0)
     _, J = evaluate_quadrics(some.matrices, some.goal)
     assert np.linalg.svd(J, compute_uv=False)[-1] < 1e-9

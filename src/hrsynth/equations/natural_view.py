@@ -1,9 +1,9 @@
 """Natural view of a robot's loops: of each link a point and the directions that its joints use, in the base frame.
 
-A joint that only rotates and a held direction are linear in them, a slide is bilinear, and scalar products of a link's
-directions are constant (J. García de Jalón and E. Bayo, Kinematic and Dynamic Simulation of Multibody Systems, 1994,
-chapter 2). Two coupled rotations have one power of their complex units each, z₁ᵖ = z₂^q with p / q the ratio. Lengths
-are in characteristic lengths.
+A joint that only rotates, and a direction or image point seen from the base, are linear in them; a slide is bilinear;
+scalar products of a link's directions are constant (J. García de Jalón and E. Bayo, Kinematic and Dynamic Simulation of
+Multibody Systems, 1994, chapter 2). Two coupled rotations have one power of their complex units each, z₁ᵖ = z₂^q with
+p / q the ratio. Lengths are in characteristic lengths.
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ from ..errors import UnsupportedLocus
 from ..geometry.vectors import Array, find_perpendicular, invert_pose, transform
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism import Direction, Joint, JointType, Mechanism, Observation
+from ..mechanism.cameras import CameraObservation, FixedValueLocus
 from ..mechanism.model import Coupling
+from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.observations.encoder import Encoder
 from ..results import Value
 from ..tolerances import CHAIN_ROUNDING, GEAR_RATIO_MAX, GEOMETRY_DIFFERENCE_TOL
@@ -64,7 +66,7 @@ class NaturalView(Value):
         Of each group of links that have one rotation: an orthonormal basis (3, d), at the goal, of the directions used,
         and the places (d, 3) of their images; None for the base's.
     is_length
-        Whether unknowns are coordinates of points, shape (n,).
+        True for unknowns that are coordinates of points, shape (n,).
     size
         Bound of the distance of two points.
     """
@@ -80,7 +82,7 @@ class NaturalView(Value):
 
     @property
     def has_products_of_lengths(self) -> NDArray[np.bool_]:
-        """Whether an equation has a product with a point, shape (N,)."""
+        """Return True for each equation with a product of a point, shape (N,)."""
         return np.any(self.matrices[:, 1:, 1:][:, self.is_length], axis=(1, 2))
 
     def narrow(self, farthest: Array) -> NaturalView:
@@ -138,9 +140,12 @@ class _JointGeometry:
     names: list[str]
     base: str
     points: dict[tuple[str, str], Array]
+    origins: dict[str, Array]
     axes: dict[tuple[str, str], list[Array]]
-    held: list[tuple[str, Array]]
+    held: list[tuple[str, Array, str]]
+    loci: list[tuple[str, FixedValueLocus, str]]
     locked: set[str]
+    length: float
     gears: list[_Gear] = field(default_factory=list)
 
 
@@ -170,6 +175,7 @@ class _Gear:
 def read_natural_view(
     goal: ClosedConfiguration,
     observations: Collection[Observation],
+    reference: str,
     left_out: Collection[str],
     kept_directions: Collection[tuple[str, Array]],
     error: float,
@@ -180,8 +186,8 @@ def read_natural_view(
     ----------
     goal
         Closed configuration, within ``error`` (m) of the exact one.
-    observations
-        Directions seen from the base, and encoders of all coordinates of a joint.
+    observations, reference
+        Observations with known loci, and encoders of all coordinates of a joint; the link from which they are measured.
     left_out
         Joints of legs that hold nothing, which are left out.
     kept_directions
@@ -195,8 +201,8 @@ def read_natural_view(
         If a joint or an observation has no such equations.
     """
     length = goal.model.length
-    geometry = _read(goal, observations, left_out)
-    geometry.held += [(link, direction) for link, direction in kept_directions if link in geometry.names]
+    geometry = _read(goal, observations, reference, left_out)
+    geometry.held += [(link, direction, geometry.base) for link, direction in kept_directions if link in geometry.names]
     unite = {link: link for link in geometry.names}
     for joint in geometry.joints:
         if joint.type in RIGID or joint.name in geometry.locked:
@@ -217,7 +223,7 @@ def read_natural_view(
         n += 3 * d
     links = dict[str, NaturalLink]()
     for link in geometry.names:
-        origin = next(at for (_, name), at in geometry.points.items() if name == link)
+        origin = geometry.origins[link]
         links[link] = unite[link], origin, None if link == geometry.base else n + np.arange(3)
         if link != geometry.base:
             places.append(origin)
@@ -234,7 +240,9 @@ def read_natural_view(
     farthest *= 1.0 + REACH_MARGIN_FRACTION
     arms = [np.linalg.norm(at - links[link][1]) for (_, link), at in geometry.points.items()]
     size = 1.0 + float(farthest.max(initial=1.0)) + float(max(arms, default=0.0))
-    view = NaturalView(np.zeros((0, n + 1, n + 1)), np.zeros(0), np.concatenate(places), farthest, links, groups, is_length, size)
+    view = NaturalView(
+        np.zeros((0, n + 1, n + 1)), np.zeros(0), np.concatenate(places), farthest, links, groups, is_length, size
+    )
     matrices = np.array(list(_list_equations(view, geometry, unite, spinning)))
     off = error / length + goal.residual + CHAIN_ROUNDING + miss
     view = replace(view, matrices=matrices)
@@ -243,30 +251,38 @@ def read_natural_view(
 
 
 def _read(
-    goal: ClosedConfiguration, observations: Collection[Observation], left_out: Collection[str]
+    goal: ClosedConfiguration, observations: Collection[Observation], reference: str, left_out: Collection[str]
 ) -> _JointGeometry:
     """Read joints at the goal, in each of their links; raises ``UnsupportedLocus``."""
     mechanism, length = goal.model.mechanism, goal.model.length
     joints = [joint for joint in mechanism.joints.values() if joint.name not in left_out]
-    names = [link for link in mechanism.links if any(link in joint.links for joint in joints)]
+    used = {mechanism.base, *(link for joint in joints for link in joint.links)}
+    for seen in observations:
+        used |= set() if isinstance(seen, Encoder) else {seen.link, seen.seen_from or reference}
+    names = [link for link in mechanism.links if link in used]
     moved = {link: goal.pose(link) @ invert_pose(mechanism.links[link].pose) for link in names}
     points, axes = dict[tuple[str, str], Array](), dict[tuple[str, str], list[Array]]()
     for joint in joints:
-        if joint.type is JointType.FREE:
-            raise UnsupportedLocus(mechanism.name, f"joint {joint.name} holds nothing")
         for link in joint.links:
             points[joint.name, link] = transform(moved[link], joint.point) / length
             axes[joint.name, link] = [moved[link][:3, :3] @ axis for axis in joint.axes]
-    held, counts = list[tuple[str, Array]](), dict[str, int]()
+    held, loci, counts = list[tuple[str, Array, str]](), list[tuple[str, FixedValueLocus, str]](), dict[str, int]()
     for seen in observations:
         if isinstance(seen, Encoder):
             counts[seen.joint] = counts.get(seen.joint, 0) + 1
-        elif isinstance(seen, Direction) and (seen.seen_from or mechanism.base) == mechanism.base:
-            held.append((seen.link, goal.pose(seen.link)[:3, :3] @ seen.direction))
-        else:
-            raise UnsupportedLocus(mechanism.name, "an observation is not a direction seen from the base")
+            continue
+        origin = seen.seen_from or reference
+        if isinstance(seen, Direction):
+            held.append((seen.link, goal.pose(seen.link)[:3, :3] @ seen.direction, origin))
+            continue
+        known: tuple[FixedValueLocus, ...] = ()
+        if isinstance(seen, CameraObservation | SeenAxis):
+            known = seen.loci(seen.sighting(goal.pose(origin), goal.pose(seen.link)))
+        if not known:
+            raise UnsupportedLocus(mechanism.name, f"the locus of {seen.text} is not known")
+        loci += [(seen.link, locus, origin) for locus in known]
     part = [name for name, count in counts.items() if count < mechanism.joints[name].type.freedoms]
-    if part or any(link not in names for link, _ in held):
+    if part:
         raise UnsupportedLocus(mechanism.name, "an observation holds a part of a joint")
     locked = set(counts)
     pairs = [{gear.driver, gear.driven} for gear in mechanism.couplings]
@@ -275,7 +291,9 @@ def _read(
     for joint in joints:
         if joint.name in locked or joint.type is JointType.FIXED:  # one place of two links that move together
             points[joint.name, joint.successor] = points[joint.name, joint.predecessor]
-    geometry = _JointGeometry(joints, names, mechanism.base, points, axes, held, locked)
+    origins = {link: goal.pose(link)[:3, 3] / length for link in names}
+    origins |= {link: at for (_, link), at in reversed(points.items())}
+    geometry = _JointGeometry(joints, names, mechanism.base, points, origins, axes, held, loci, locked, length)
     geometry.gears = [
         _read_gear(geometry, mechanism, gear) for gear in mechanism.couplings if gear.driver not in locked
     ]
@@ -305,15 +323,23 @@ def _list_used_directions(geometry: _JointGeometry, unite: dict[str, str]) -> tu
     """Return the directions (3,) that joints and observations use of each group of links, and the U joints whose cross
     only turns a rod about itself, which nothing else feels."""
     used: dict[str, list[Array]] = {group: [] for group in unite.values()}
-    origin = dict[str, Array]()
-    for link, direction in geometry.held:
+    origin = geometry.origins
+    for link, direction, reference in geometry.held:
         used[unite[link]].append(direction)
+        used[unite[reference]].append(direction)
     for joint in geometry.joints:
         for link in joint.links:
             at = geometry.points[joint.name, link]
-            used[unite[link]].append(at - origin.setdefault(link, at))
+            used[unite[link]].append(at - origin[link])
             if joint.type is not JointType.UNIVERSAL:
                 used[unite[link]] += geometry.axes[joint.name, link][:1]
+    for link, locus, reference in geometry.loci:
+        used[unite[reference]] += [*locus.normals]
+        if locus.turns:
+            used[unite[link]].append(locus.place)
+        else:
+            used[unite[link]].append(locus.place / geometry.length - origin[link])
+            used[unite[reference]].append(locus.through / geometry.length - origin[reference])
     for gear in geometry.gears:
         for joint, unit in zip((gear.driver, gear.driven), gear.units, strict=True):
             used[unite[joint.successor]].append(unit)
@@ -364,6 +390,8 @@ def _list_equations(
     unit = np.eye(1, n + 1)
     constant = build_product(unit, unit)
     for joint in geometry.joints:
+        if joint.type is JointType.FREE:
+            continue
         first, second = joint.links
         gap = view.point(first, geometry.points[joint.name, first]) - view.point(
             second, geometry.points[joint.name, second]
@@ -386,9 +414,10 @@ def _list_equations(
         elif joint.type is not JointType.SPHERICAL:
             same = view.direction(first, axes[0][0]) - view.direction(second, axes[1][0])
             yield from (build_product(unit, row[None]) for row in same)
-    for link, direction in geometry.held:
-        same = view.direction(link, direction) - write_rows(None, direction, n)
+    for link, direction, reference in geometry.held:
+        same = view.direction(link, direction) - view.direction(reference, direction)
         yield from (build_product(unit, row[None]) for row in same)
+    yield from _list_locus_equations(view, geometry)
     place = n - sum(gear.count for gear in geometry.gears)
     for gear in geometry.gears:
         yield from _list_gear_equations(view, geometry, gear, place)
@@ -396,6 +425,22 @@ def _list_equations(
     for basis, places in view.groups.values():
         if places is not None:
             yield from _list_rotation_equations(basis, [write_rows(triple, np.zeros(3), n) for triple in places], unit)
+
+
+def _list_locus_equations(view: NaturalView, geometry: _JointGeometry) -> Iterator[Array]:
+    """Yield that points stay in planes and on spheres, and that directions keep angles."""
+    unit = np.eye(1, len(view.goal) + 1)
+    constant = build_product(unit, unit)
+    for link, locus, reference in geometry.loci:
+        if locus.turns:
+            moved, value = view.direction(link, locus.place), locus.place
+        else:
+            place, through = locus.place / geometry.length, locus.through / geometry.length
+            moved, value = view.point(link, place) - view.point(reference, through), place - through
+        for normal in locus.normals:
+            yield build_product(view.direction(reference, normal), moved) - (normal @ value) * constant
+        if locus.radius is not None:
+            yield (build_product(moved, moved) - (value @ value) * constant) / 2
 
 
 def _list_gear_equations(view: NaturalView, geometry: _JointGeometry, gear: _Gear, place: int) -> Iterator[Array]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import cmath
 import math
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -87,7 +88,7 @@ class QuadricSolver:
         """
         self.cases += not np.iscomplexobj(matrices)
         self.solved += 1
-        if self.solved > CASES_MAX:
+        if self.cases > CASES_MAX or self.solved > 4 * CASES_MAX:
             raise ExternalSolverFailure("natural coordinates", f"more than {CASES_MAX} cases")
         reduced = eliminate_linear(matrices, errors, farthest)
         if self.solved == 1:
@@ -118,17 +119,17 @@ class QuadricSolver:
         if single is not None:
             k, step.weights, cases = single
             step.unknown, others = k, np.zeros((0, m))
-            # where a real value is beyond its bound, the others may be complex
-            far = [
-                (complex(y), off) for y, off in cases if isinstance(y, float) and abs(y) - off > reduced.farthest[k - 1]
-            ]
-            for value, off in [*cases, *far]:
+            for value, off in cases:
                 fixed = np.zeros((1, m + 1, m + 1), dtype=type(value))
                 fixed[0, 0, 0], fixed[0, 0, k], fixed[0, k, 0] = -value, 0.5, 0.5
                 more, besides = self.solve(np.vstack([matrices, fixed]), np.append(errors, off), reduced.farthest)
-                boxes, others = boxes + more, np.vstack([others, besides])
                 if not isinstance(value, complex) and self.last is not None:
                     step.cases.append((value, off, self.last))
+                    if self.last.contradictory:  # nothing real within bounds, but there may be complex solutions
+                        known = np.vstack([matrices, fixed]).astype(complex)
+                        with suppress(ExternalSolverFailure):
+                            besides = self.solve(known, np.append(errors, off), reduced.farthest)[1]
+                boxes, others = boxes + more, np.vstack([others, besides])
             return boxes, others
         if is_complex:
             points = find_solutions(reduced.table, m)

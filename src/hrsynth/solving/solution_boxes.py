@@ -104,10 +104,11 @@ class _QuotientAlgebra(Value):
 
 
 class Multiples:
-    """Multiples, up to a degree, of quadrics (N, terms) in m unknowns."""
+    """Multiples, up to a degree, of quadrics (N, terms) in m unknowns; ``is_inconsistent`` if 1 is a sum of them, to
+    rounding."""
 
     def __init__(self, table: Array, m: int, degree: int) -> None:
-        self.m, self.degree = m, degree
+        self.m, self.degree, self.is_inconsistent = m, degree, False
         self.exponents = list_exponents(m, degree)
         self.index = {row.tobytes(): k for k, row in enumerate(self.exponents)}
         factors, unit = list_exponents(m, degree - 2), np.vstack([np.zeros(m, dtype=int), np.eye(m, dtype=int)])
@@ -125,6 +126,7 @@ class Multiples:
         U, s, Vh = np.linalg.svd(R)
         rank = int(np.sum(s > INDEPENDENT_MIN * s[0]))
         kernel = Vh[rank:].conj().T
+        self.is_inconsistent = rank == len(self.exponents)
         if (basis := self._choose_basis(kernel)) is None:
             return None
         unit = np.eye(self.m, dtype=int)
@@ -169,7 +171,7 @@ def enclose_all_solutions(table: Array, errors: Array, farthest: Array) -> Confi
     """
     sums = [_draw_sum(len(farthest), seed) for seed in range(SUMS_COUNT)]
     for multiples, quotient in _list_quotients(table, len(farthest)):
-        boxes = _enclose_all(multiples, quotient, errors, farthest, sums)
+        boxes = None if quotient is None else _enclose_all(multiples, quotient, errors, farthest, sums)
         if boxes is not None:
             return boxes
     return None
@@ -178,19 +180,21 @@ def enclose_all_solutions(table: Array, errors: Array, farthest: Array) -> Confi
 def find_solutions(table: Array, m: int) -> Array | None:
     """Return all solutions (k, m) of quadrics with complex coefficients, from eigenvectors, without proof; None where
     they are not isolated."""
-    first = next(_list_quotients(table, m), None)
-    return None if first is None else _read_points(first[1], np.linalg.eig(_sum_products(first[1], _draw_sum(m, 0)))[1])
+    for multiples, quotient in _list_quotients(table, m):
+        if quotient is not None:
+            return _read_points(quotient, np.linalg.eig(_sum_products(quotient, _draw_sum(m, 0)))[1])
+        if multiples.is_inconsistent:
+            return np.zeros((0, m))
+    return None
 
 
-def _list_quotients(table: Array, m: int) -> Iterator[tuple[Multiples, _QuotientAlgebra]]:
-    """Yield multiples by their degree that show a quotient."""
+def _list_quotients(table: Array, m: int) -> Iterator[tuple[Multiples, _QuotientAlgebra | None]]:
+    """Yield multiples by their degree, and the quotient that they show."""
     for degree in range(2, DEGREE_MAX + 1):
         if comb(m + degree, m) > MONOMIALS_MAX:
             return
         multiples = Multiples(table, m, degree)
-        quotient = multiples.quotient()
-        if quotient is not None:
-            yield multiples, quotient
+        yield multiples, multiples.quotient()
 
 
 def _sum_products(quotient: _QuotientAlgebra, r: Array) -> Array:

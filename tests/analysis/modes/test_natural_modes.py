@@ -12,6 +12,7 @@ from adversary.kinds import KINDS
 from analysis.modes.ankles import ankle
 from analysis.modes.closings import closings
 from analysis.modes.test_planar_loops import LINKS, STEPHENSON, linkage
+from analysis.modes.test_sighted import ROBOTS as SEEN
 from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.modes.branches import Model
 from hrsynth.analysis.modes.goal_error import drift
@@ -131,13 +132,26 @@ def test_directions_that_no_sample_turns_are_kept(tmp_path: Path):
     assert listed.within == "poses at which links keep the directions that they keep in this operation mode"
 
 
+@pytest.mark.some(2)
+@pytest.mark.parametrize("name", ["seen from the base", "cameras on both", "beside legs, from the platform", "an arm"])
+def test_what_cameras_and_sensors_measure_is_held(name: str):
+    """Points, distances, cameras on the platform: all poses of the other lists, antipodal ones too."""
+    setup = SEEN[name]()
+    listed = hrsynth.modes(setup, at=setup.configurations[0], cone=0)
+    made, found = solve_natural(MeasuredRobot.of(setup), listed.goal, drift(listed.goal))
+    assert listed.found.complete
+    body, own = next(iter(made.bodies(made.home))), poses_of(made, found)
+    others = [mode.bodies[body] for mode in (*listed.modes, *listed.antipodal) if mode.bodies]
+    for X in others:
+        assert min(compare_poses(X, each, listed.goal.model.length) for each in own) < SAME
+    assert len(own) == len(others) or listed.within == "poses with the rotation of this one"
+
+
 def test_what_is_not_known_is_refused():
-    """A goal that is not exact, a platform that is a point, a family."""
+    """A goal that is not exact, a family."""
     setup = ObservedRobot.of("3rrr_m1")
     with pytest.raises(UnsupportedLocus, match="is not bounded"):
         solve_natural(MeasuredRobot.of(setup), setup.all_samples.start, np.inf)
-    with pytest.raises(UnsupportedLocus, match="is a point"):
-        solve(hrsynth.load("prrrp_parallel_point"), real=True)
     with pytest.raises(ExternalSolverFailure, match="the goal is not isolated"):
         solve(hrsynth.load("3prp"), real=False)
 

@@ -17,7 +17,8 @@ from ...kinematics.assembly import build_from_link_poses
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.tasks import FixedValuesTask
 from ...kinematics.velocity_relation import ObservationModel
-from ...mechanism import Direction, Mechanism
+from ...mechanism import Mechanism
+from ...mechanism.legs import Leg
 from ...mechanism.observations.encoder import Encoder
 from ...solving.quadric_solver import QuadricSolver, SolutionBox
 from ...solving.uniqueness import enclose_unique, evaluate_quadrics, is_excluded
@@ -150,28 +151,31 @@ def _read(measured: MeasuredRobot, goal: ClosedConfiguration, error: float, kept
     """Return the robot without legs that hold nothing."""
     setup, model = measured.setup, measured.observation_model
     mechanism, name, point = goal.model.mechanism, setup.robot.name, setup.decomposition.point
-    if model.reference != mechanism.base:
-        raise UnsupportedLocus(name, "its platform is seen from a link that is not its base")
     joints = {seen.joint for seen in model.observations if isinstance(seen, Encoder)}
-    links = {seen.link for seen in model.observations}
+    links = {link for seen in model.observations for link in (seen.link, seen.seen_from or model.reference)}
     least = PLANAR_LEG_DOF_MIN if is_planar(mechanism) else LEG_DOF_MIN
     free_legs = [
         leg
         for leg in setup.decomposition.legs
-        if not joints & {*leg.joints}
-        and not links & {*leg.links}
-        and sum(mechanism.joints[joint].type.freedoms for joint in leg.joints) >= least
+        if not joints & {*leg.joints} and not links & {*leg.links} and _count_serial_dof(mechanism, leg) >= least
     ]
+    if least == PLANAR_LEG_DOF_MIN and len(free_legs) == len(setup.decomposition.legs):
+        free_legs = []  # one of them holds the plane
     left_out = {joint for leg in free_legs for joint in leg.joints} | _list_hanging(measured, mechanism)
     directions = _list_kept_directions(measured, goal, left_out) if kept else []
-    # at zero joints have one place in both links, so loops are closed exactly
-    is_exact = setup.normal.moved == 0.0 and np.array_equal(goal.q, goal.model.q0)
-    view = read_natural_view(goal, model.observations, left_out, directions, 0.0 if is_exact else error)
+    view = read_natural_view(goal, model.observations, model.reference, left_out, directions, error)
     bodies = list_placing_links(setup.decomposition)
     for link in mechanism.links if mechanism.couplings else bodies:
         if link not in view.links or view.groups[view.links[link][0]][0].shape[1] < 2 - (point is not None):
             raise UnsupportedLocus(name, f"the joints do not place {link}")
     return NaturalPlatform((), np.zeros((0, 3)), goal, view, bodies, kept, point, error=error)
+
+
+def _count_serial_dof(mechanism: Mechanism, leg: Leg) -> int:
+    """Return the dof of a leg; 0 for one with loops."""
+    joints = [mechanism.joints[name] for name in leg.joints]
+    has_loops = len(joints) >= len({link for joint in joints for link in joint.links})
+    return 0 if has_loops else sum(joint.type.freedoms for joint in joints)
 
 
 def _list_hanging(measured: MeasuredRobot, mechanism: Mechanism) -> set[str]:
@@ -182,8 +186,11 @@ def _list_hanging(measured: MeasuredRobot, mechanism: Mechanism) -> set[str]:
 
     base, bodies = mechanism.base, list_placing_links(measured.setup.decomposition)
     graph = nx.Graph(joint.links for joint in mechanism.joints.values())
-    seen = [each.link for each in measured.observation_model.observations if isinstance(each, Direction)]
-    graph.add_edges_from((base, link) for link in (*bodies, *seen))
+    model = measured.observation_model
+    graph.add_edges_from((base, body) for body in bodies)
+    graph.add_edges_from(
+        (seen.seen_from or model.reference, seen.link) for seen in model.observations if not isinstance(seen, Encoder)
+    )
     parts: list[set[str]] = list(map(set, nx.biconnected_components(graph)))  # type: ignore[arg-type]
     parts = [part for part in parts if any({base, body} <= part for body in bodies)]
     return {joint.name for joint in mechanism.joints.values() if not any(set(joint.links) <= part for part in parts)}
