@@ -457,7 +457,7 @@ def _list_gear_equations(view: NaturalView, geometry: _JointGeometry, gear: _Gea
             moved.append(
                 build_product(view.direction(joint.predecessor, axis), gap) - along * build_product(unit, unit)
             )
-        yield gear.ratio * moved[0] - moved[1]
+        yield (gear.ratio * moved[0] - moved[1]) / (1.0 + abs(gear.ratio))
         return
     ends = list[Array]()
     for joint, u, power in zip((gear.driver, gear.driven), gear.units, (abs(gear.p), gear.q), strict=True):

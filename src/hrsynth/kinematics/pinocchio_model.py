@@ -373,7 +373,8 @@ class PinocchioModel:
         step[self.coordinates[root]] += 2 * np.pi * turns
         for name in moved:
             for gear, row in zip(self.mechanism.couplings, self._gears, strict=True):
-                if gear.driver == name and self.mechanism.joints[gear.driven].type is JointType.REVOLUTE:
+                is_rotation = self.mechanism.joints[gear.driven].type is JointType.REVOLUTE
+                if gear.driver == name and is_rotation and gear.driven not in moved:
                     place = self.coordinates[gear.driven][0]
                     step[place] -= 2 * np.pi * np.round(row @ step / row[place] / (2 * np.pi))
                     moved.append(gear.driven)
