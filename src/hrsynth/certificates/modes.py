@@ -78,10 +78,12 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
 def _list_again(found: AssemblyModes) -> AssemblyModes | None:
     """Return a list in natural coordinates; None where that has not as many modes."""
     measured, goal = MeasuredRobot.of(found.setup, found.kind == "real"), found.goal
-    with suppress(UnsupportedLocus, ExternalSolverFailure, TooLarge):
-        model, listed = solve_natural(measured, goal, drift(goal, None, found.setup.normal.moved))
-        if len(listed.modes) == len(found.modes) + len(found.antipodal):
-            return replace(found, model=model, found=listed)
+    for keeps in (False, True):
+        with suppress(UnsupportedLocus, ExternalSolverFailure, TooLarge):
+            error = drift(goal, None, found.setup.normal.moved)
+            model, listed = solve_natural(measured, goal, error, keeps=keeps)
+            if len(listed.modes) == len(found.modes) + len(found.antipodal):
+                return replace(found, model=model, found=listed)
     return None
 
 

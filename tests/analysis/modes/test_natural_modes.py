@@ -38,7 +38,14 @@ def solve(robot: Mechanism, real: bool) -> tuple[Model, SystemModes]:
     """The list in natural coordinates."""
     setup = ObservedRobot.of(robot, driven=real)
     goal = setup.all_samples.start
-    return solve_natural(MeasuredRobot.of(setup, real), goal, drift(goal, None, setup.normal.moved))
+    measured, error = MeasuredRobot.of(setup, real), drift(goal, None, setup.normal.moved)
+    try:
+        return solve_natural(measured, goal, error)
+    except ExternalSolverFailure as unsolved:
+        try:
+            return solve_natural(measured, goal, error, keeps=True)
+        except UnsupportedLocus:
+            raise unsolved from None
 
 
 def poses_of(made: Model, found: SystemModes) -> list[Array]:

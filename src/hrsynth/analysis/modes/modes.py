@@ -558,18 +558,22 @@ def _modes_by_system(
     answers = list[tuple[Model, SystemModes]]()
     exact = drift(goal, wanted, setup.normal.moved)
     free = without_couplings(measured, goal)
-    tips, asked, natural = (
+    tips, asked, natural, narrower = (
         partial(solve_tips, as_written=as_written, time_limit=time_limit),
         partial(solve_posed, time_limit=time_limit),
         partial(solve_natural, time_limit=time_limit),
+        partial(solve_natural, time_limit=time_limit, keeps=True),
     )
     ways = (natural, tips, asked, solve_carried) if free else (tips, asked, natural, solve_carried)
-    for way in ways:
-        if way is not natural and not setup.decomposition.is_platform_decided:
+    for way in (*ways, narrower):
+        if way is narrower and any(answer[1].complete for answer in answers):
+            break
+        is_whole = way in (natural, narrower)
+        if not is_whole and not setup.decomposition.is_platform_decided:
             reasons.append(UnsupportedLocus(setup.robot.name, "joints inside its platform allow several poses of it"))
             continue
         try:
-            answers.append(way(*(free if free and way is not natural else (measured, goal)), exact))
+            answers.append(way(*(free if free and not is_whole else (measured, goal)), exact))
         except (UnsupportedLocus, ExternalSolverFailure, TooLarge, MissingExtra) as error:
             reasons.append(error)
         else:

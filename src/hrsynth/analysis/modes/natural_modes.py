@@ -127,24 +127,22 @@ class NaturalPlatform(System):
 
 
 def solve_natural(
-    measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0, *, time_limit: float = MODES_TIME_LIMIT_S
+    measured: MeasuredRobot,
+    goal: ClosedConfiguration,
+    error: float = 0.0,
+    *,
+    time_limit: float = MODES_TIME_LIMIT_S,
+    keeps: bool = False,
 ) -> tuple[Model, SystemModes]:
-    """All real modes, with the goal known to ``error`` (m); those that keep the directions that no sample turns, where
-    others cannot be confined. Raises ``UnsupportedLocus``, ``ExternalSolverFailure`` and ``TooLarge``."""
+    """All real modes, with the goal known to ``error`` (m); if ``keeps``, those that keep the directions that no sample
+    turns. Raises ``UnsupportedLocus``, ``ExternalSolverFailure`` and ``TooLarge``."""
     if time_limit < NATURAL_TIME_S:
         raise TooLarge("a system of equations", "natural coordinates", NATURAL_TIME_S, time_limit)
     if not np.isfinite(error):
         raise UnsupportedLocus(
             measured.setup.robot.name, "the distance to the exact closed configuration is not bounded"
         )
-    whole = _read(measured, goal, error, kept=False)
-    try:
-        return _solve(whole)
-    except ExternalSolverFailure:
-        kept = _read(measured, goal, error, kept=True)
-        if len(kept.view.matrices) == len(whole.view.matrices):
-            raise
-        return _solve(kept)
+    return _solve(_read(measured, goal, error, keeps))
 
 
 def _read(measured: MeasuredRobot, goal: ClosedConfiguration, error: float, kept: bool) -> NaturalPlatform:
@@ -163,6 +161,8 @@ def _read(measured: MeasuredRobot, goal: ClosedConfiguration, error: float, kept
         free_legs = []  # one of them holds the plane
     left_out = {joint for leg in free_legs for joint in leg.joints} | _list_hanging(measured, mechanism)
     directions = _list_kept_directions(measured, goal, left_out) if kept else []
+    if kept and not directions:
+        raise UnsupportedLocus(name, "no link keeps a direction")
     view = read_natural_view(goal, model.observations, model.reference, left_out, directions, error)
     bodies = list_placing_links(setup.decomposition)
     for link in mechanism.links if mechanism.couplings else bodies:
