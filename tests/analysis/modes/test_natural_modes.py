@@ -17,7 +17,7 @@ from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.modes.branches import Model
 from hrsynth.analysis.modes.goal_error import drift
 from hrsynth.analysis.modes.modes import AssemblyModes
-from hrsynth.analysis.modes.natural_modes import solve_natural
+from hrsynth.analysis.modes.natural_modes import NaturalPlatform, solve_natural
 from hrsynth.analysis.modes.solve import SystemModes
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.errors import ExternalSolverFailure, UnsupportedLocus
@@ -132,11 +132,16 @@ def test_four_ruu_robots_have_one_mode(seed: int, tmp_path: Path):
 
 
 @pytest.mark.slow
-def test_directions_that_no_sample_turns_are_kept(tmp_path: Path):
+def test_directions_that_no_sample_turns_are_kept():
     """A robot that translates in its operation mode; in others too many solutions are left."""
-    listed = hrsynth.modes(draw("translational", 3, tmp_path), cone=0)
-    assert (listed.found.complete, len(listed.modes)) == (True, 1)
-    assert listed.within == "poses at which links keep the directions that they keep in this operation mode"
+    setup = ObservedRobot.of(hrsynth.load("quattro"), driven=True)
+    measured, goal = MeasuredRobot.of(setup, real=True), setup.all_samples.start
+    with pytest.raises(ExternalSolverFailure):
+        solve_natural(measured, goal)
+    made, found = solve_natural(measured, goal, keeps=True)
+    assert (found.complete, found.complex, len(found.modes)) == (True, 4, 4)
+    assert isinstance(made.system, NaturalPlatform)
+    assert made.system.kept
 
 
 @pytest.mark.some(2)

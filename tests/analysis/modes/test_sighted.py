@@ -49,7 +49,7 @@ def table() -> dict[tuple[str, ...], tuple[int, int]]:
 
 
 OPEN = (("line", "distance", "distance"), True)
-"""Whose modes are found, and no bound proves that they are all, as the page says."""
+"""Whose modes are found, and not always proved to be all, as the page says."""
 QUICK = [("point",) * 3, ("point", "point", "image_line"), ("point", "image_line", "image_line"), ("image_line",) * 3]
 
 
@@ -64,8 +64,8 @@ def test_a_mixed_set_has_the_modes_that_the_page_tells(row: tuple[str, ...]) -> 
 @pytest.mark.slow
 def test_a_free_body_without_a_proof_is_answered_too() -> None:
     row, cameras = OPEN
-    found = modes(watched(row, 0, cameras))
-    assert (len(found.modes) > 0, found.found.complete) == (True, False)
+    found = modes(watched(row, 2, cameras))
+    assert (len(found.modes), found.found.complete) == (2, False)
 
 
 @pytest.mark.some(0, 1)
@@ -76,7 +76,7 @@ def test_all_rows_of_the_page(seed: int, cameras: bool) -> None:
     for row, counts in table().items():
         found = modes(watched(row, seed, cameras))
         assert found.found.complex == counts[cameras], row
-        assert found.found.complete == ((row, cameras) != OPEN), row
+        assert found.found.complete or (row, cameras) == OPEN, row
         assert count(row, seed, cameras) == counts[cameras], row
 
 
