@@ -39,6 +39,8 @@ ROTATION_SPREAD_MAX = 1e-8
 """Change of a direction over the samples up to which none turns it."""
 GOAL_ISOLATED_MIN = 1e-9
 """Smallest singular value of the equations at the goal, over the largest, where it is isolated."""
+COMPLEX_RESIDUAL_MAX = 1e-5
+"""Largest value of the equations, relative to products of the unknowns, at a complex solution that is counted."""
 NARROWER_MAX = 0.5
 """Size of what all boxes lie in, over that of the bounds, up to which a list is computed again within it."""
 
@@ -260,7 +262,9 @@ def _solve(system: NaturalPlatform) -> tuple[Model, SystemModes]:
             )
     if not any(np.all(np.abs(view.goal - mode.q) <= SAME_POSE_TOL) for mode in modes):
         raise ExternalSolverFailure("natural coordinates", "the goal is in none of the boxes")
-    count = system.count_poses([*(mode.q for mode in modes), *others])
+    # combinations of a low degree may leave points that are no solutions
+    complex_points = [x for x in others if _compute_residual(view, x) <= COMPLEX_RESIDUAL_MAX]
+    count = system.count_poses([*(mode.q for mode in modes), *complex_points])
     proof = (
         f"{n} coordinates of points and directions, {m} of them left by linear equations: all real solutions"
         + f" within {SLIDE_REACH_MAX:g} characteristic lengths" * is_reach_assumed
@@ -273,6 +277,12 @@ def _solve(system: NaturalPlatform) -> tuple[Model, SystemModes]:
     # legs that are closed one by one need not meet couplings
     coupled = system.goal.model.mechanism.couplings
     return Model(system, system.place_all, view.goal, closing=system.close if coupled else None), listed
+
+
+def _compute_residual(view: NaturalView, x: Array) -> float:
+    """Return the largest value of the equations at a complex point (n,), relative to its products."""
+    extent = 1.0 + float(np.abs(x).max(initial=0.0))
+    return float(np.abs(evaluate_quadrics(view.matrices, x)[0]).max(initial=0.0)) / extent**2
 
 
 def _is_isolated(view: NaturalView) -> bool:
