@@ -7,12 +7,14 @@ import pytest
 
 import hrsynth
 from analysis.modes.closings import closings
+from analysis.modes.test_sighted import ROBOTS as SEEN
 from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.modes.modes import AssemblyModes
 from hrsynth.analysis.modes.natural_modes import NaturalPlatform, solve_natural
 from hrsynth.equations.natural_view import NaturalView, read_natural_view
 from hrsynth.geometry.vectors import Array, invert_pose
 from hrsynth.kinematics.configuration import ClosedConfiguration
+from hrsynth.kinematics.tasks import solve as close
 from hrsynth.solving.uniqueness import evaluate_quadrics
 from kinematics.robots import ROBOTS
 from strategies import planar, pods
@@ -80,3 +82,27 @@ def test_an_equation_holds_what_a_joint_holds():
     some = read_natural_view(setup.all_samples.start, measured.observation_model.observations[:2], "base", (), (), 0.0)
     _, J = evaluate_quadrics(some.matrices, some.goal)
     assert np.linalg.svd(J, compute_uv=False)[-1] < 1e-9
+
+
+@pytest.mark.parametrize("name", ["seen from the base", "cameras on both"])
+def test_errors_bound_what_an_inexact_goal_changes(name: str):
+    """Read at a configuration beside the goal, the equations miss at the goal's modes by less than their errors."""
+    setup, rng = SEEN[name](), np.random.default_rng(0)
+    listed, model = hrsynth.modes(setup, at=setup.configurations[0], cone=0), setup.samples.observation_model
+    goal, length = listed.goal, listed.goal.model.length
+    J = goal.model.jacobian(goal.q)
+    free = np.linalg.svd(J)[2][np.linalg.matrix_rank(J, tol=1e-6) :]
+    step = 1e-7 * free.T @ free @ rng.normal(size=goal.model.nv)
+    beside = ClosedConfiguration.of(
+        goal.model, close(goal.model, goal.model.integrate(goal.q, step), tolerance=1e-15)[0]
+    )
+    places = np.array([[*goal.pose(link)[:3, 3], 1.0] for link in goal.model.mechanism.links])
+    moves = [beside.pose(link) @ invert_pose(goal.pose(link)) - np.eye(4) for link in goal.model.mechanism.links]
+    far = max(float(np.linalg.norm((places @ D.T)[:, :3], axis=1).max()) for D in moves)
+    error = max(far, *(length * float(np.linalg.norm(D[:3, :3], 2)) for D in moves))
+    view = read_natural_view(beside, model.observations, model.reference, (), (), error)
+    seen = [mode.configuration for mode in listed.modes if mode.configuration is not None]
+    assert len(seen) > 1
+    for at in seen:
+        values = np.abs(evaluate_quadrics(view.matrices, value_at(view, beside, at))[0])
+        assert np.all(values <= view.errors)

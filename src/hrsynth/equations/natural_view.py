@@ -34,6 +34,8 @@ RIGID = frozenset({JointType.PRISMATIC, JointType.FIXED})
 """Joints whose two links have one rotation."""
 SLIDE_REACH_MAX = 100.0
 """Bound of what only slides reach (characteristic lengths): solutions beyond are not sought."""
+CENTRE_DISTANCE_MIN = 1e-6
+"""Least distance of an observed point from a camera's centre (characteristic lengths) for bounds of errors."""
 LINEAR = frozenset({JointType.REVOLUTE, JointType.UNIVERSAL, JointType.SPHERICAL, JointType.FIXED})
 """Joints whose two links share a point."""
 
@@ -143,7 +145,7 @@ class _JointGeometry:
     origins: dict[str, Array]
     axes: dict[tuple[str, str], list[Array]]
     held: list[tuple[str, Array, str]]
-    loci: list[tuple[str, FixedValueLocus, str]]
+    loci: list[tuple[str, FixedValueLocus, str, float]]
     locked: set[str]
     length: float
     gears: list[_Gear] = field(default_factory=list)
@@ -266,7 +268,8 @@ def _read(
         for link in joint.links:
             points[joint.name, link] = transform(moved[link], joint.point) / length
             axes[joint.name, link] = [moved[link][:3, :3] @ axis for axis in joint.axes]
-    held, loci, counts = list[tuple[str, Array, str]](), list[tuple[str, FixedValueLocus, str]](), dict[str, int]()
+    held, loci = list[tuple[str, Array, str]](), list[tuple[str, FixedValueLocus, str, float]]()
+    counts = dict[str, int]()
     for seen in observations:
         if isinstance(seen, Encoder):
             counts[seen.joint] = counts.get(seen.joint, 0) + 1
@@ -275,12 +278,15 @@ def _read(
         if isinstance(seen, Direction):
             held.append((seen.link, goal.pose(seen.link)[:3, :3] @ seen.direction, origin))
             continue
-        known: tuple[FixedValueLocus, ...] = ()
-        if isinstance(seen, CameraObservation | SeenAxis):
-            known = seen.loci(seen.sighting(goal.pose(origin), goal.pose(seen.link)))
-        if not known:
-            raise UnsupportedLocus(mechanism.name, f"the locus of {seen.text} is not known")
-        loci += [(seen.link, locus, origin) for locus in known]
+        unknown = UnsupportedLocus(mechanism.name, f"the locus of {seen.text} is not known")
+        if not isinstance(seen, CameraObservation | SeenAxis):
+            raise unknown
+        at = seen.sighting(goal.pose(origin), goal.pose(seen.link))
+        if not (known := seen.loci(at)):
+            raise unknown
+        # rays and planes through a centre turn by the goal's error over its distance
+        nearest = min(float(np.linalg.norm(place - at.C)) for place in (at.B, at.foot)) / length
+        loci += [(seen.link, locus, origin, 1.0 + 1.0 / max(nearest, CENTRE_DISTANCE_MIN)) for locus in known]
     part = [name for name, count in counts.items() if count < mechanism.joints[name].type.freedoms]
     if part:
         raise UnsupportedLocus(mechanism.name, "an observation holds a part of a joint")
@@ -333,7 +339,7 @@ def _list_used_directions(geometry: _JointGeometry, unite: dict[str, str]) -> tu
             used[unite[link]].append(at - origin[link])
             if joint.type is not JointType.UNIVERSAL:
                 used[unite[link]] += geometry.axes[joint.name, link][:1]
-    for link, locus, reference in geometry.loci:
+    for link, locus, reference, _ in geometry.loci:
         used[unite[reference]] += [*locus.normals]
         if locus.turns:
             used[unite[link]].append(locus.place)
@@ -428,17 +434,21 @@ def _list_equations(
 
 
 def _list_locus_equations(view: NaturalView, geometry: _JointGeometry) -> Iterator[Array]:
-    """Yield that points stay in planes and on spheres, and that directions keep angles."""
+    """Yield that points stay in planes and on spheres, and that directions keep angles; over how much farther the
+    error of a normal reaches."""
     unit = np.eye(1, len(view.goal) + 1)
     constant = build_product(unit, unit)
-    for link, locus, reference in geometry.loci:
+    for link, locus, reference, lever in geometry.loci:
+        # a fixed plane is in no product, whose error would have the size of what it is multiplied by
+        is_fixed = not locus.turns and view.groups[view.links[reference][0]][1] is None
+        scale = 1.0 + lever * (view.size if is_fixed else 1.0) / 2
         if locus.turns:
             moved, value = view.direction(link, locus.place), locus.place
         else:
             place, through = locus.place / geometry.length, locus.through / geometry.length
             moved, value = view.point(link, place) - view.point(reference, through), place - through
         for normal in locus.normals:
-            yield build_product(view.direction(reference, normal), moved) - (normal @ value) * constant
+            yield (build_product(view.direction(reference, normal), moved) - (normal @ value) * constant) / scale
         if locus.radius is not None:
             yield (build_product(moved, moved) - (value @ value) * constant) / 2
 
