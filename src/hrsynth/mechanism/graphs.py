@@ -58,6 +58,15 @@ def list_components(graph: Adjacency, within: Container[str] | None = None) -> I
             yield part
 
 
+def list_blocks(pairs: Iterable[tuple[str, str]]) -> list[set[str]]:
+    """Return the nodes of each block of the graph with these edges: those on loops that share two nodes, or both ends
+    of an edge on no loop."""
+    import networkx as nx
+
+    graph: nx.Graph[str] = nx.Graph(pairs)
+    return list(map(set, nx.biconnected_components(graph)))  # type: ignore[arg-type]
+
+
 def is_bridge(pairs: Sequence[tuple[str, str]], place: int) -> bool:
     """Return True if nothing else connects the two ends of the edge at this index among all edges."""
     one, other = pairs[place]

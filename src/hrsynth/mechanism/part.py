@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ..errors import BadRequest
+from . import graphs
 from .model import Mechanism, Note
 
 
@@ -22,13 +23,10 @@ def extract_between(mechanism: Mechanism, base: str, platform: str) -> Mechanism
         raise BadRequest(f"{mechanism.name}: base and platform are the same link", base, "two links")
     import networkx as nx
 
-    graph: nx.Graph[str] = nx.Graph(joint.links for joint in mechanism.joints.values())
-    graph.add_nodes_from(mechanism.links)
-    if not nx.has_path(graph, base, platform):
+    pairs = [joint.links for joint in mechanism.joints.values()]
+    if platform not in graphs.find_component(graphs.build_adjacency(mechanism.links, pairs), base):
         raise BadRequest(f"{mechanism.name}: no chain of joints from {base!r} to", platform, "a link that is connected")
-    graph.add_edge(base, platform)
-    parts: list[set[str]] = list(map(set, nx.biconnected_components(graph)))  # type: ignore[arg-type]
-    inside = next(part for part in parts if {base, platform} <= part)
+    inside = next(part for part in graphs.list_blocks([*pairs, (base, platform)]) if {base, platform} <= part)
     gone = [link for link in mechanism.links if link not in inside]
     camera = mechanism.camera if mechanism.camera in inside else None
     observations = tuple(

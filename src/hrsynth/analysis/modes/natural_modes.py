@@ -17,7 +17,7 @@ from ...kinematics.assembly import build_from_link_poses
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.tasks import FixedValuesTask
 from ...kinematics.velocity_relation import ObservationModel
-from ...mechanism import Mechanism
+from ...mechanism import Mechanism, graphs
 from ...mechanism.legs import Leg
 from ...mechanism.observations.encoder import Encoder
 from ...solving.quadric_solver import QuadricSolver, SolutionBox
@@ -184,17 +184,13 @@ def _list_hanging(measured: MeasuredRobot, mechanism: Mechanism) -> set[str]:
     """Return joints of what hangs on links that place the platform, or on the base, and holds nothing of it."""
     if mechanism.couplings:
         return set()
-    import networkx as nx
-
     base, bodies = mechanism.base, list_placing_links(measured.setup.decomposition)
-    graph = nx.Graph(joint.links for joint in mechanism.joints.values())
     model = measured.observation_model
-    graph.add_edges_from((base, body) for body in bodies)
-    graph.add_edges_from(
+    pairs = [joint.links for joint in mechanism.joints.values()] + [(base, body) for body in bodies]
+    pairs += [
         (seen.seen_from or model.reference, seen.link) for seen in model.observations if not isinstance(seen, Encoder)
-    )
-    parts: list[set[str]] = list(map(set, nx.biconnected_components(graph)))  # type: ignore[arg-type]
-    parts = [part for part in parts if any({base, body} <= part for body in bodies)]
+    ]
+    parts = [part for part in graphs.list_blocks(pairs) if any({base, body} <= part for body in bodies)]
     return {joint.name for joint in mechanism.joints.values() if not any(set(joint.links) <= part for part in parts)}
 
 

@@ -166,14 +166,11 @@ def _is_rail(graph: JointGraph, slide: JointSpec, trunk: str, platform: str | No
     overrides this."""
     if graph.platform is not None or platform == trunk or any(slide.name in (g.driver, g.driven) for g in graph.gears):
         return False
-    import networkx as nx
-
     on = [joint for joint in graph.joints.values() if trunk in joint.links and joint is not slide]
     if len(on) == 1 and on[0].type is JointType.PRISMATIC:
         return _is_rail(graph, on[0], next(link for link in on[0].links if link != trunk), platform)
     bodies = _RigidBodies(graph, trunk)
-    rest: nx.Graph[str] = nx.Graph((a, b) for a, ends in bodies.near.items() for b in ends)
-    loops: list[set[str]] = list(map(set, nx.biconnected_components(rest)))  # type: ignore[arg-type]
+    loops = graphs.list_blocks((a, b) for a, ends in bodies.near.items() for b in ends)
     return any(bodies.base in loop for loop in loops if len(loop) > 2)
 
 
@@ -342,12 +339,9 @@ class _RigidBodies:
     def _blocks(self) -> list[set[str]]:
         """Return the bodies of each loop, of several loops if they share two bodies, and of each bond in no loop;
         nothing for too many bodies."""
-        import networkx as nx
-
         if len(self.near) > PLATFORM_GUESS_BODIES_MAX:
             return []
-        graph: nx.Graph[str] = nx.Graph((a, b) for a, ends in self.near.items() for b in ends)
-        return list(map(set, nx.biconnected_components(graph)))  # type: ignore[arg-type]
+        return graphs.list_blocks((a, b) for a, ends in self.near.items() for b in ends)
 
     def _closed(self, others: Sequence[str], distance: Mapping[str, int]) -> tuple[list[str], str]:
         """Return the bodies that several loops without the base close, and why the last one could be the platform."""
