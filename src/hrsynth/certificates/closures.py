@@ -15,14 +15,14 @@ import numpy as np
 
 from ..analysis.measured import MeasuredRobot
 from ..analysis.modes.modes import AssemblyModes
-from ..analysis.modes.quadrics import UNIT, WorkingFrame
-from ..analysis.modes.solve import SystemMode
 from ..constraints.pattern import list_leg_ends
 from ..geometry.vectors import Array, invert_pose
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.observations.direction import Direction
 from ..mechanism.observations.encoder import Encoder
+from ..solving.platform.quadrics import UNIT, WorkingFrame
+from ..solving.platform.solve import SystemMode
 from ..tolerances import CLOSURE_RESIDUAL_TOL
 
 

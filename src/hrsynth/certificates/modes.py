@@ -15,18 +15,18 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.loci.carrying_leg_system import CarriedPlatform
 from ..analysis.measured import MeasuredRobot
-from ..analysis.modes.carrying_leg_system import CarriedPlatform
-from ..analysis.modes.goal_error import drift
 from ..analysis.modes.modes import AssemblyModes, modes
 from ..analysis.modes.natural_modes import NaturalPlatform, solve_natural
-from ..analysis.modes.quadrics import WorkingFrame
-from ..analysis.modes.solve import SystemModes
 from ..analysis.observed import ObservedRobot
 from ..errors import ExternalSolverFailure, NoCertificate, TooLarge, UnsupportedLocus
 from ..geometry.vectors import Array
+from ..kinematics.goal_error import drift
 from ..mechanism import Mechanism
 from ..mechanism.pose import Pose
+from ..solving.platform.quadrics import WorkingFrame
+from ..solving.platform.solve import SystemModes
 from . import verify_solutions
 from .bounds import bound
 from .chains import write_chain

@@ -17,13 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.modes.loci import Plane, Sphere
-from ..analysis.modes.pose_coordinate_solver import by_homotopy
-from ..analysis.modes.quadrics import COORDINATE_BITS_COUNT, PoseSystem
-from ..analysis.modes.rigid import Spatial
+from ..geometry.loci import Plane, Sphere
 from ..geometry.so3 import convert_to_quaternions
 from ..geometry.vectors import Array
 from ..solving.newton import approach_zeros
+from ..solving.platform.pose_coordinate_solver import by_homotopy
+from ..solving.platform.quadrics import COORDINATE_BITS_COUNT, PoseSystem
+from ..solving.platform.rigid import Spatial
 from .closures import write_numbers
 from .refining import Polynomial, ScaledEquations
 from .verify_certificate import KINDS, CertificateRejection, conditions, integral, poses, rational, reach_of

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.modes.quadrics import WorkingFrame
-from ..analysis.modes.roots import SolutionSet, is_real
 from ..geometry.vectors import Array
+from ..solving.platform.quadrics import WorkingFrame
+from ..solving.platform.roots import SolutionSet, is_real
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.modes.loci import Circle, Line, Point, Reach, Sphere
-from ..analysis.modes.quadrics import UNIT, RoundedConic, WorkingFrame, direction, spokes
+from ..geometry.loci import Circle, Line, Point, Reach, Sphere
 from ..geometry.so3 import convert_to_quaternions
 from ..geometry.vectors import cross, normalise_vector
+from ..solving.platform.quadrics import UNIT, RoundedConic, WorkingFrame, direction, spokes
 from .closures import round_numbers, write_numbers
 from .verify_certificate import dot
 

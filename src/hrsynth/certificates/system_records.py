@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.modes.loci import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, shift_reach
-from ..analysis.modes.quadrics import PoseSystem, WorkingFrame
-from ..analysis.modes.rigid import Planar, Spatial
-from ..analysis.modes.solve import SquareSolution
-from ..analysis.modes.square_systems import TURNS, SquareSystem
-from ..analysis.modes.translating import ArticulatedPlatform, TranslatingPlatform, is_coplanar, met_normal
+from ..geometry.loci import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, shift_reach
 from ..geometry.vectors import Array
+from ..solving.platform.quadrics import PoseSystem, WorkingFrame
+from ..solving.platform.rigid import Planar, Spatial
+from ..solving.platform.solve import SquareSolution
+from ..solving.platform.square_systems import TURNS, SquareSystem
+from ..solving.platform.translating import ArticulatedPlatform, TranslatingPlatform, is_coplanar, met_normal
 from .closures import ClosedRobot, round_numbers, write_numbers
 from .poses import regular
 from .proposed import ProposedRecord, placed_in, starts_of

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..analysis.modes.loci import Circle, Curve, Line, Point
+from ..geometry.loci import Circle, Curve, Line, Point
 from ..geometry.vectors import Array, find_perpendicular, normalise_vector
 
 COUPLER_CURVE_SAMPLES_COUNT = 1440

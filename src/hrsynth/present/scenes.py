@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.loci.tips import Tip, TipLoci
 from ..analysis.modes.assembly_mode import AssemblyMode
-from ..analysis.modes.loci import Circle, Curve, Line, Point, Reach, Sphere, shift_reach
 from ..analysis.modes.modes import AssemblyModes
-from ..analysis.modes.tips import Tip, TipLoci
+from ..geometry.loci import Circle, Curve, Line, Point, Reach, Sphere, shift_reach
 from ..geometry.vectors import Array, invert_pose, transform
 from .coupler import evaluate_curve, sweep_third_point, trace_coupler, trace_coupler_chains
 from .skeleton import trace_leg_outlines, trace_link_outline

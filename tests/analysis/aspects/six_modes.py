@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrsynth.analysis.modes.loci import Circle
-from hrsynth.analysis.modes.rigid import Planar
-from hrsynth.analysis.modes.solve import solve
+from hrsynth.geometry.loci import Circle
 from hrsynth.geometry.vectors import Array, build_pose, find_perpendicular, invert_pose, normalise_vector
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism import Mechanism
+from hrsynth.solving.platform.rigid import Planar
+from hrsynth.solving.platform.solve import solve
 from strategies import planar
 
 LEGS = (1, 2, 3)

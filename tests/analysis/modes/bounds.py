@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from analysis.modes.draws import FAMILIES
 from analysis.modes.laws import among, draw
-from hrsynth.analysis.modes.solve import solve
+from hrsynth.solving.platform.solve import solve
 
 GOAL = 1e-10
 """Distance at which the pose that generated the directions is among the modes."""

@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hrsynth.analysis.modes.loci import Circle, Line, Plane, Point, Reach, Sphere
-from hrsynth.analysis.modes.rigid import Planar, Spatial
-from hrsynth.analysis.modes.translating import ArticulatedPlatform, TranslatingPlatform
+from hrsynth.geometry.loci import Circle, Line, Plane, Point, Reach, Sphere
 from hrsynth.geometry.vectors import Array, build_pose, normalise_vector, rotate_about_axis
+from hrsynth.solving.platform.rigid import Planar, Spatial
+from hrsynth.solving.platform.translating import ArticulatedPlatform, TranslatingPlatform
 from strategies import random_rotation
 
 Rng = np.random.Generator

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from analysis.modes.draws import FAMILIES, MEETING, SURFACES, Draw
-from hrsynth.analysis.modes.constrained_platform import System
-from hrsynth.analysis.modes.msolve import executable
-from hrsynth.analysis.modes.solve import SystemModes, solve, solve_by_msolve
 from hrsynth.errors import MissingExtra
 from hrsynth.geometry.vectors import Array
+from hrsynth.solving.platform.constrained_platform import System
+from hrsynth.solving.platform.msolve import executable
+from hrsynth.solving.platform.solve import SystemModes, solve, solve_by_msolve
 
 EVERY = FAMILIES | MEETING | SURFACES
 

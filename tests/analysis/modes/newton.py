@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from hrsynth.analysis.modes.constrained_platform import System
-from hrsynth.analysis.modes.loci import Circle, Curve, Line
-from hrsynth.analysis.modes.rigid import Planar, Spatial
-from hrsynth.analysis.modes.translating import ArticulatedPlatform, TranslatingPlatform
+from hrsynth.geometry.loci import Circle, Curve, Line
+from hrsynth.solving.platform.constrained_platform import System
+from hrsynth.solving.platform.rigid import Planar, Spatial
+from hrsynth.solving.platform.translating import ArticulatedPlatform, TranslatingPlatform
 
 Batch = Any
 """A complex array whose first axis counts the starts."""

@@ -8,11 +8,11 @@ from __future__ import annotations
 import numpy as np
 
 from analysis.modes.draws import Draw
-from hrsynth.analysis.modes.loci import Circle, Line
-from hrsynth.analysis.modes.solve import solve
+from hrsynth.geometry.loci import Circle, Line
 from hrsynth.geometry.vectors import Array, find_perpendicular, normalise_vector
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
+from hrsynth.solving.platform.solve import solve
 
 Rng = np.random.Generator
 

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from flint import nmod_mat
 
-from hrsynth.analysis.modes.loci import Circle, Line, Plane, Sphere
-from hrsynth.analysis.modes.quadrics import normals
-from hrsynth.analysis.modes.rigid import Spatial
+from hrsynth.geometry.loci import Circle, Line, Plane, Sphere
+from hrsynth.solving.platform.quadrics import normals
+from hrsynth.solving.platform.rigid import Spatial
 
 PRIME = 2147483629
 COORDINATES, LEFT = 17, 11

@@ -7,11 +7,11 @@ import pytest
 import sympy
 from flint import arb, ctx
 
-from hrsynth.analysis.modes.loci import Circle, Curve, Line, Point
-from hrsynth.analysis.modes.polynomials import Equation, cycle, pair
-from hrsynth.analysis.modes.rigid import Planar, Spatial
 from hrsynth.errors import BadRequest
+from hrsynth.geometry.loci import Circle, Curve, Line, Point
 from hrsynth.solving.krawczyk import enclose_zero
+from hrsynth.solving.platform.polynomials import Equation, cycle, pair
+from hrsynth.solving.platform.rigid import Planar, Spatial
 
 x, y, z = sympy.symbols("x y z")
 

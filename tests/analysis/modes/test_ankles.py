@@ -11,10 +11,10 @@ import hrsynth
 from analysis.modes.ankles import LEGS, ankle, carried, counted
 from analysis.modes.test_robots import check_completeness, check_modes, same_modes
 from analysis.modes.test_surfaces import needs_msolve
+from hrsynth.analysis.loci.carrying_leg import carried_platform
+from hrsynth.analysis.loci.joint_forms import closings_bound, eigenvalues
 from hrsynth.analysis.measured import MeasuredRobot
-from hrsynth.analysis.modes.carrying_leg import carried_platform
 from hrsynth.analysis.modes.carrying_leg_modes import polish_zeros, proposals
-from hrsynth.analysis.modes.joint_forms import closings_bound, eigenvalues
 from hrsynth.errors import UnsupportedLocus
 from hrsynth.geometry.vectors import build_pose, rotate_about_axis
 from hrsynth.mechanism.model import Motor

@@ -12,9 +12,9 @@ from analysis.modes.draws import FAMILIES, Draw
 from analysis.modes.laws import draw
 from analysis.modes.reached import six_ups, three_rrr, two_plates
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
-from hrsynth.analysis.modes.solve import solve
 from hrsynth.description import list_robots, load
 from hrsynth.mechanism import Mechanism
+from hrsynth.solving.platform.solve import solve
 from strategies import planar
 
 PLANAR = {

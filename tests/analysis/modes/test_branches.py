@@ -7,12 +7,12 @@ import pytest
 
 from analysis.modes.drives import closings, driven
 from analysis.modes.pods import displacements, pods
-from hrsynth.analysis.modes.loci import Line
-from hrsynth.analysis.modes.loci_from_joints import reaches
-from hrsynth.analysis.modes.locked_chain import Chain, ChainBody, LocusDerivationFailure
+from hrsynth.analysis.loci.loci_from_joints import reaches
+from hrsynth.analysis.loci.locked_chain import Chain, ChainBody, LocusDerivationFailure
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.geometry import build_mechanism
+from hrsynth.geometry.loci import Line
 from hrsynth.geometry.vectors import Array, cross, find_perpendicular, normalise_vector
 from hrsynth.mechanism.builder import Builder
 from strategies import ring

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from analysis.modes.draws import Draw, Rng, on_two_bodies, planar, spatial, translating
-from hrsynth.analysis.modes.loci import Circle, shift_reach
 from hrsynth.analysis.modes.modes import modes
-from hrsynth.analysis.modes.rigid import Planar, Spatial
-from hrsynth.analysis.modes.solve import SystemModes, solve
-from hrsynth.analysis.modes.translating import TranslatingPlatform
 from hrsynth.description import list_robots, load
+from hrsynth.geometry.loci import Circle, shift_reach
 from hrsynth.geometry.vectors import Array, normalise_vector
 from hrsynth.present.text.poses import format_modes as text
+from hrsynth.solving.platform.rigid import Planar, Spatial
+from hrsynth.solving.platform.solve import SystemModes, solve
+from hrsynth.solving.platform.translating import TranslatingPlatform
 from strategies import random_rotation
 
 MORE: dict[str, Callable[[Rng], Draw]] = {

@@ -21,10 +21,10 @@ import numpy as np
 import pytest
 from flint import acb, arb, ctx, nmod_mat
 
-from hrsynth.analysis.modes.polynomials import Quadric
 from hrsynth.geometry.vectors import Array
 from hrsynth.mechanism.observations.point import ImagePoint
 from hrsynth.solving.krawczyk import enclose_zero
+from hrsynth.solving.platform.polynomials import Quadric
 
 PRIME = (1 << 62) - 57
 UNITS = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]

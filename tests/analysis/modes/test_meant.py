@@ -9,12 +9,12 @@ import pytest
 
 from analysis.modes.draws import six_rods, spatial
 from analysis.modes.laws import among, needs_msolve
-from hrsynth.analysis.modes.loci import Line
-from hrsynth.analysis.modes.overdetermined import snap_centres
-from hrsynth.analysis.modes.rigid import Spatial
-from hrsynth.analysis.modes.solve import solve
 from hrsynth.errors import GeometryAmbiguous
+from hrsynth.geometry.loci import Line
 from hrsynth.geometry.vectors import Array
+from hrsynth.solving.platform.overdetermined import snap_centres
+from hrsynth.solving.platform.rigid import Spatial
+from hrsynth.solving.platform.solve import solve
 from strategies import random_rotation
 
 CLASSES = [

@@ -9,12 +9,12 @@ import sympy
 from analysis.modes.draws import FAMILIES, articulated, planar, spatial, translating
 from analysis.modes.laws import among, check_member, draw
 from analysis.modes.newton import pose_of, real_ones, solutions
-from hrsynth.analysis.modes.constrained_platform import System
-from hrsynth.analysis.modes.loci import Circle, Curve, Line, shift_reach
-from hrsynth.analysis.modes.rigid import Planar, Spatial
-from hrsynth.analysis.modes.solve import SystemModes, solve
-from hrsynth.analysis.modes.translating import ArticulatedPlatform, TranslatingPlatform
+from hrsynth.geometry.loci import Circle, Curve, Line, shift_reach
 from hrsynth.geometry.vectors import Array, build_pose, normalise_vector, rotate_about_axis
+from hrsynth.solving.platform.constrained_platform import System
+from hrsynth.solving.platform.rigid import Planar, Spatial
+from hrsynth.solving.platform.solve import SystemModes, solve
+from hrsynth.solving.platform.translating import ArticulatedPlatform, TranslatingPlatform
 from strategies import random_rotation
 
 ALL = sorted(FAMILIES)

@@ -10,9 +10,9 @@ import pytest
 
 import hrsynth
 from hrsynth.analysis.modes.modes import AssemblyModes
-from hrsynth.analysis.modes.self_motions import SelfMotion
 from hrsynth.description import list_robots, load
 from hrsynth.geometry.vectors import Array, normalise_vector, rotate_about_axis
+from hrsynth.kinematics.self_motions import SelfMotion
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Limits

@@ -7,9 +7,9 @@ import pytest
 
 import hrsynth
 from analysis.modes.laws import needs_msolve
-from hrsynth.analysis.modes.modular_root_bound import combine_quadrics, most_zeros
-from hrsynth.analysis.modes.polynomials import Quadric
 from hrsynth.description import list_robots, load
+from hrsynth.solving.platform.modular_root_bound import combine_quadrics, most_zeros
+from hrsynth.solving.platform.polynomials import Quadric
 from strategies import random_rotation, transformed
 
 HEIGHT = 1000

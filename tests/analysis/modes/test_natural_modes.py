@@ -15,14 +15,14 @@ from analysis.modes.test_planar_loops import LINKS, STEPHENSON, linkage
 from analysis.modes.test_sighted import ROBOTS as SEEN
 from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.modes.branches import Model
-from hrsynth.analysis.modes.goal_error import drift
 from hrsynth.analysis.modes.modes import AssemblyModes
 from hrsynth.analysis.modes.natural_modes import NaturalPlatform, solve_natural
-from hrsynth.analysis.modes.solve import SystemModes
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.errors import ExternalSolverFailure, UnsupportedLocus
 from hrsynth.geometry.vectors import Array, compare_poses
+from hrsynth.kinematics.goal_error import drift
 from hrsynth.mechanism import Mechanism
+from hrsynth.solving.platform.solve import SystemModes
 from kinematics.robots import ROBOTS
 from strategies import planar, pods
 

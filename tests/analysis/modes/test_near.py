@@ -13,7 +13,7 @@ from scipy.optimize import minimize_scalar
 import hrsynth
 from description.foreign.rounded import exported, of_hinges
 from hrsynth.analysis.modes.modes import AssemblyModes
-from hrsynth.analysis.modes.near import descend, measurement_bound
+from hrsynth.analysis.modes.near_modes import descend, measurement_bound
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.pose_requests import solve_configurations
 from hrsynth.description import list_robots, load

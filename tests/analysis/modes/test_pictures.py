@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from hrsynth.analysis.modes.loci import Circle, Line, Point
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.cli import run_command
 from hrsynth.description import list_robots, load
 from hrsynth.errors import BadRequest
+from hrsynth.geometry.loci import Circle, Line, Point
 from hrsynth.geometry.vectors import rotate_about_axis
 from hrsynth.present.coupler import evaluate_curve, sweep_third_point, trace_coupler, trace_coupler_chains
 from hrsynth.present.modes import MARKS, describe_scene, draw_modes, draw_modes_figure, require_scene

@@ -11,9 +11,9 @@ import pytest
 import hrsynth
 from analysis.modes.gears import closings, five_bar, linkage
 from hrsynth.analysis.measured import MeasuredRobot
+from hrsynth.analysis.modes.mode_search import search
 from hrsynth.analysis.modes.modes import AssemblyModes
 from hrsynth.analysis.modes.natural_modes import solve_natural
-from hrsynth.analysis.modes.search import search
 from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.geometry import build_mechanism
 from hrsynth.constraints.pattern import list_leg_ends, list_placing_links

@@ -7,9 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hrsynth.analysis.loci.tips import tip_loci
 from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.modes.branches import solve_all
-from hrsynth.analysis.modes.conditions import (
+from hrsynth.analysis.modes.condition_modes import pose_platform, solve_posed
+from hrsynth.analysis.modes.mode_search import search
+from hrsynth.analysis.modes.modes import modes
+from hrsynth.analysis.pose_requests import observe
+from hrsynth.catalog.architecture_key import parse
+from hrsynth.catalog.geometry import build_mechanism
+from hrsynth.constraints.pattern import list_leg_ends
+from hrsynth.geometry.vectors import compare_poses
+from hrsynth.solving.platform.pose_bound import _Quotient, bound, dimensions
+from hrsynth.solving.platform.pose_conditions import (
     AtAngle,
     Coplanar,
     OnCylinder,
@@ -19,17 +29,7 @@ from hrsynth.analysis.modes.conditions import (
     OnRevolution,
     OnTwoCircles,
 )
-from hrsynth.analysis.modes.modes import modes
-from hrsynth.analysis.modes.pose_bound import _Quotient, bound, dimensions
-from hrsynth.analysis.modes.pose_conditions_solver import pose_platform, solve_posed
-from hrsynth.analysis.modes.pose_forms import Poses, SquareForms
-from hrsynth.analysis.modes.search import search
-from hrsynth.analysis.modes.tips import tip_loci
-from hrsynth.analysis.pose_requests import observe
-from hrsynth.catalog.architecture_key import parse
-from hrsynth.catalog.geometry import build_mechanism
-from hrsynth.constraints.pattern import list_leg_ends
-from hrsynth.geometry.vectors import compare_poses
+from hrsynth.solving.platform.pose_forms import Poses, SquareForms
 from strategies import spherical
 
 SAME = 1e-6

@@ -15,12 +15,10 @@ from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.modes.assembly_mode import AssemblyMode
 from hrsynth.analysis.modes.branches import MODES_TIME_LIMIT_S, Model
 from hrsynth.analysis.modes.carrying_leg_modes import solve_carried
-from hrsynth.analysis.modes.goal_error import drift
-from hrsynth.analysis.modes.methods import solve_tips, without_couplings
+from hrsynth.analysis.modes.condition_modes import solve_posed
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.analysis.modes.natural_modes import solve_natural
-from hrsynth.analysis.modes.pose_conditions_solver import solve_posed
-from hrsynth.analysis.modes.solve import SystemModes
+from hrsynth.analysis.modes.tip_modes import solve_tips, without_couplings
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.pose_requests import observe as watched
 from hrsynth.description import list_robots, load
@@ -35,11 +33,13 @@ from hrsynth.errors import (
 )
 from hrsynth.geometry.vectors import Array, build_pose, compare_poses, invert_pose
 from hrsynth.kinematics.configuration import ClosedConfiguration
+from hrsynth.kinematics.goal_error import drift
 from hrsynth.mechanism import Joint, JointType, Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Coupling
 from hrsynth.mechanism.pose import Pose
 from hrsynth.present.show import text
+from hrsynth.solving.platform.solve import SystemModes
 from kinematics.robots import state_of
 from oracle import Oracle
 from strategies import PLANAR_WORDS, POD_WORDS, deltas, planar, pods, random_rotation, reordered, transformed

@@ -12,14 +12,14 @@ import hrsynth
 from analysis.modes.closings import other_branch
 from analysis.modes.test_robots import check_modes, robot_of
 from hrsynth.analysis.measured import MeasuredRobot
+from hrsynth.analysis.modes.mode_search import search
 from hrsynth.analysis.modes.modes import AssemblyModes
-from hrsynth.analysis.modes.msolve import PACKAGE
-from hrsynth.analysis.modes.search import search
 from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.entry import build_mechanism
 from hrsynth.constraints.pattern import list_leg_ends
 from hrsynth.description import list_robots, load
 from hrsynth.mechanism import Mechanism
+from hrsynth.solving.platform.msolve import PACKAGE
 
 LISTED = [
     ("3rrr_m1", None, False),

@@ -17,11 +17,11 @@ from analysis.modes.counted import count
 from analysis.modes.test_posed import distance
 from analysis.modes.watched import free_body, watched, written
 from analysis.test_sensors import arm
+from hrsynth.analysis.loci.leg_conditions import OriginAndUnit
+from hrsynth.analysis.loci.observation_loci import PlatformObservation, conditions
 from hrsynth.analysis.measured import MeasuredRobot
-from hrsynth.analysis.modes.leg_conditions import OriginAndUnit
+from hrsynth.analysis.modes.mode_search import search
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
-from hrsynth.analysis.modes.observation_loci import PlatformObservation, conditions
-from hrsynth.analysis.modes.search import search
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.pose_requests import observe
 from hrsynth.constraints.pattern import list_leg_ends

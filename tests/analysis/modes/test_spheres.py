@@ -14,13 +14,13 @@ from analysis.modes import sections
 from analysis.modes.draws import Draw, dietmaier, six_rods, spatial
 from analysis.modes.laws import among
 from analysis.modes.test_meant import CLASSES
-from hrsynth.analysis.modes.bounds import degree_bound, least_bound
-from hrsynth.analysis.modes.homotopy import section
-from hrsynth.analysis.modes.loci import Circle, Plane, Point, Sphere
-from hrsynth.analysis.modes.rigid import Spatial
-from hrsynth.analysis.modes.solve import SystemModes, solve
 from hrsynth.description import list_robots, load
+from hrsynth.geometry.loci import Circle, Plane, Point, Sphere
 from hrsynth.geometry.vectors import build_pose, normalise_vector, rotate_about_axis
+from hrsynth.solving.platform.homotopy import section
+from hrsynth.solving.platform.rigid import Spatial
+from hrsynth.solving.platform.root_bound import degree_bound, least_bound
+from hrsynth.solving.platform.solve import SystemModes, solve
 from strategies import random_rotation
 
 Rng = np.random.Generator

@@ -13,17 +13,17 @@ import pytest
 
 from analysis.modes.draws import FAMILIES, MEETING, SURFACES, on_two_bodies, spatial, translating
 from analysis.modes.laws import among, check_agreement, check_member, draw, needs_msolve
-from hrsynth.analysis.modes.constrained_platform import System
-from hrsynth.analysis.modes.loci import Circle, Plane, Reach, Sphere
-from hrsynth.analysis.modes.msolve import parametrise, read, write_system
-from hrsynth.analysis.modes.polynomials import Quadric
-from hrsynth.analysis.modes.pose_coordinate_solver import wholes
-from hrsynth.analysis.modes.quadrics import Balls
-from hrsynth.analysis.modes.rigid import Planar
-from hrsynth.analysis.modes.solve import solve, solve_by_msolve
-from hrsynth.analysis.modes.translating import ArticulatedPlatform, TranslatingPlatform
 from hrsynth.errors import BadRequest, ExternalSolverFailure, MissingExtra
+from hrsynth.geometry.loci import Circle, Plane, Reach, Sphere
 from hrsynth.geometry.vectors import normalise_vector, rotate_about_axis
+from hrsynth.solving.platform.constrained_platform import System
+from hrsynth.solving.platform.msolve import parametrise, read, write_system
+from hrsynth.solving.platform.polynomials import Quadric
+from hrsynth.solving.platform.pose_coordinate_solver import wholes
+from hrsynth.solving.platform.quadrics import Balls
+from hrsynth.solving.platform.rigid import Planar
+from hrsynth.solving.platform.solve import solve, solve_by_msolve
+from hrsynth.solving.platform.translating import ArticulatedPlatform, TranslatingPlatform
 from strategies import random_rotation
 
 SLOWEST = {

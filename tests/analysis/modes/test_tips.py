@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from analysis.modes.laws import needs_msolve
+from hrsynth.analysis.loci.tips import tip_loci
 from hrsynth.analysis.modes.branches import model
-from hrsynth.analysis.modes.loci import Circle, Line, Plane, Point, Sphere
-from hrsynth.analysis.modes.solve import solve
-from hrsynth.analysis.modes.tips import tip_loci
 from hrsynth.analysis.observed import ObservedRobot, build_motor_model
 from hrsynth.constraints.pattern import recognise
 from hrsynth.description import list_robots, load
 from hrsynth.errors import UnsupportedLocus
+from hrsynth.geometry.loci import Circle, Line, Plane, Point, Sphere
 from hrsynth.kinematics.locked_twists import locate_joint
 from hrsynth.mechanism.legs import decompose
+from hrsynth.solving.platform.solve import solve
 
 HIDDEN = {
     "3rrr_m1": Circle,

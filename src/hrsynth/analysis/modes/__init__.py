@@ -1,1 +1,1 @@
-"""All poses of a platform whose tips are confined to points, lines and circles: counted, enclosed and proved."""
+"""Assembly modes: poses of the platform with the same measured values, listed, judged and proved."""

@@ -18,12 +18,12 @@ from ...kinematics.tasks import FixedValuesTask
 from ...kinematics.velocity_relation import ObservationModel, compute_relation
 from ...mechanism.pose import Pose
 from ...records import FLAT, As, Number, Record, Recorded, Shown
+from ...solving.platform.solve import SystemMode
 from ...tolerances import CLOSURE_RESIDUAL_TOL, RELATION_ANGLE_TOL
+from ..loci.observation_loci import behind, opposite, sights
 from ..observed import ObservedRobot
 from ..singularity.condition_check import compute_smallest_value
 from .branches import Model
-from .observation_loci import behind, opposite, sights
-from .solve import SystemMode
 
 
 class LegReachFailure(NamedTuple):

@@ -11,16 +11,16 @@ from itertools import combinations, islice, product
 import numpy as np
 
 from ...errors import TooLarge
+from ...geometry.loci import Circle, Line, Plane, Reach
 from ...geometry.vectors import Array, build_plane_axes, build_pose, compare_poses, invert_pose, transform
 from ...kinematics.configuration import ClosedConfiguration
 from ...results import Value
+from ...solving.platform.constrained_platform import System
+from ...solving.platform.rigid import Planar, Spatial
+from ...solving.platform.solve import SystemMode, SystemModes, solve
+from ...solving.platform.translating import ArticulatedPlatform, TranslatingPlatform
 from ...tolerances import POINT_DISTANCE_TOL, RANK_GAP_MIN
-from .constrained_platform import System
-from .loci import Circle, Line, Plane, Reach
-from .rigid import Planar, Spatial
-from .solve import SystemMode, SystemModes, solve
-from .tips import TipLoci
-from .translating import ArticulatedPlatform, TranslatingPlatform
+from ..loci.tips import TipLoci
 
 LEG_SOLUTION_CHOICES_MAX = 256
 """Largest number of combinations of leg solutions; beyond it the list of modes is not complete."""

@@ -15,13 +15,7 @@ from ...geometry.vectors import Array, cross, freeze_array, hat
 from ...kinematics.configuration import ClosedConfiguration
 from ...solving.krawczyk import Polynomial, enclose_zero
 from ...solving.newton import approach_zeros, collect_zeros
-from ..measured import MeasuredRobot
-from .branches import Model
-from .carrying_leg import carried_platform
-from .carrying_leg_system import CarriedCondition, CarriedEquation, CarriedPlatform
-from .conditions import PoseCondition
-from .joint_forms import closings_bound, eigenvalues
-from .pose_boxes import (
+from ...solving.platform.pose_boxes import (
     COMPLEX_ZERO_IMAGINARY_MIN,
     POSE_BOX_BITS_COUNT,
     PoseBox,
@@ -31,8 +25,14 @@ from .pose_boxes import (
     told_far,
     zeros,
 )
-from .pose_forms import Poses
-from .solve import SystemMode, SystemModes
+from ...solving.platform.pose_conditions import PoseCondition
+from ...solving.platform.pose_forms import Poses
+from ...solving.platform.solve import SystemMode, SystemModes
+from ..loci.carrying_leg import carried_platform
+from ..loci.carrying_leg_system import CarriedCondition, CarriedEquation, CarriedPlatform
+from ..loci.joint_forms import closings_bound, eigenvalues
+from ..measured import MeasuredRobot
+from .branches import Model
 
 RANDOM_START_JOINTS_MAX = 2
 """Joints up to which random starts find all zeros soon."""

@@ -16,6 +16,7 @@ from ...errors import UndefinedValue
 from ...geometry.ranks import compute_kernel_basis
 from ...geometry.vectors import Array, build_pose
 from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.goal_error import drift
 from ...kinematics.tasks import FixedValuesTask, solve
 from ...kinematics.velocity_relation import ObservationModel, compute_relation
 from ...mechanism import JointType
@@ -36,9 +37,8 @@ from ...tolerances import (
     RELATION_ANGLE_TOL,
 )
 from ..formation import Formation, Similarities, analyze_formation, list_sensed_points
+from ..loci.observation_loci import opposite
 from ..observed import ObservedRobot
-from .goal_error import drift
-from .observation_loci import opposite
 
 Bodies = dict[str, Array]
 

@@ -14,7 +14,9 @@ from ...constraints.pattern import list_placing_links
 from ...errors import BadRequest, ExternalSolverFailure, MissingExtra, PoseReachFailure, TooLarge, UnsupportedLocus
 from ...kinematics.assembly import Assembly, build_from_link_poses
 from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.goal_error import drift, is_planar
 from ...kinematics.limits import list_joints_beyond
+from ...kinematics.self_motions import SelfMotion, self_motion
 from ...kinematics.tasks import Task
 from ...kinematics.velocity_relation import ObservationModel
 from ...mechanism.observation import Observation
@@ -23,10 +25,13 @@ from ...options import option
 from ...progress import report
 from ...records import FLAT, OPTIONAL, As, Shown, recorded
 from ...results import Result
+from ...solving.platform.solve import SystemModes, continuum
 from ...tolerances import MEASUREMENT_BOUND, NEAR_POSE_DIFFERENCE_TOL
 from ..analysis_declaration import analysis
 from ..branch.joint_line import follow_line
 from ..formation import Formation
+from ..loci.carrying_leg_system import CarriedPlatform
+from ..loci.tips import TipLoci
 from ..measured import MeasuredRobot
 from ..observation_inputs import POINTS, CameraLike, LegsLike, Seed, SensorLike
 from ..observed import ObservedRobot, RobotLike
@@ -34,17 +39,12 @@ from ..setup_records import LIMITS_IGNORED
 from .assembly_mode import AssemblyMode, ModeReader, found_mode
 from .branches import MODES_TIME_LIMIT_S, Model
 from .carrying_leg_modes import solve_carried
-from .carrying_leg_system import CarriedPlatform
+from .condition_modes import PosedPlatform, solve_posed
 from .formation_modes import formation_modes
-from .goal_error import drift, is_planar
-from .methods import may_count_more, solve_tips, without_couplings
+from .mode_search import FoundMode, has_unobserved_motion, search
 from .natural_modes import NaturalPlatform, prove_existence, solve_natural
-from .near import NearMode, measurement_bound, near_modes, poses_alike
-from .pose_conditions_solver import PosedPlatform, solve_posed
-from .search import FoundMode, has_unobserved_motion, search
-from .self_motions import SelfMotion, self_motion
-from .solve import SystemModes, continuum
-from .tips import TipLoci
+from .near_modes import NearMode, measurement_bound, near_modes, poses_alike
+from .tip_modes import may_count_more, solve_tips, without_couplings
 
 WITHIN = {
     "formation": "configurations up to trivial motions",
@@ -322,8 +322,8 @@ def modes(
     are not sought.
 
     If loci are of an unknown kind, or a solver gives up or is not installed, the whole robot is closed from random
-    starts (:mod:`.search`): these modes are found, and may not be all. The same is done if modes are on a self-motion:
-    the equations then have infinitely many solutions, or rounding makes some of them seem isolated.
+    starts (:mod:`.mode_search`): these modes are found, and may not be all. The same is done if modes are on a
+    self-motion: the equations then have infinitely many solutions, or rounding makes some of them seem isolated.
 
     Examples
     --------

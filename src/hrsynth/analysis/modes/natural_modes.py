@@ -15,19 +15,19 @@ from ...errors import ExternalSolverFailure, LoopClosureFailure, TooLarge, Unsup
 from ...geometry.vectors import Array, build_pose, compare_poses, freeze_array, transform
 from ...kinematics.assembly import build_from_link_poses
 from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.goal_error import is_planar, is_proved_to_exist
 from ...kinematics.tasks import FixedValuesTask
 from ...kinematics.velocity_relation import ObservationModel
 from ...mechanism import Mechanism, graphs
 from ...mechanism.legs import Leg
 from ...mechanism.observations.encoder import Encoder
+from ...solving.platform.constrained_platform import System
+from ...solving.platform.solve import SystemMode, SystemModes
 from ...solving.quadric_solver import QuadricSolver, SolutionBox
 from ...solving.uniqueness import enclose_unique, evaluate_quadrics, is_excluded
 from ..measured import MeasuredRobot
 from .assembly_mode import AssemblyMode
 from .branches import MODES_TIME_LIMIT_S, Model
-from .constrained_platform import System
-from .goal_error import is_planar, is_proved_to_exist
-from .solve import SystemMode, SystemModes
 
 NATURAL_TIME_S = 5.0
 """Estimated time of one list (s)."""

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from typing import TYPE_CHECKING
 
-from ...analysis.modes.near import degrees, measurement_bound
+from ...analysis.modes.near_modes import degrees, measurement_bound
 from ...tolerances import MEASUREMENT_BOUND
 from .poses import describe_completeness
 from .tables import GAP, Rows, format_camera_rows, format_head_rows, format_listing, format_table, name_all

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from ...analysis.configuration_report import ConfigurationReport, SingularityDistances, SingularityReport
     from ...analysis.modes.assembly_mode import AssemblyMode
     from ...analysis.modes.modes import AssemblyModes
-    from ...analysis.modes.near import NearMode
+    from ...analysis.modes.near_modes import NearMode
     from ...analysis.observed import ObservedRobot
     from ...analysis.singularity.condition_check import Agreement
     from ...analysis.singularity.singularities import Singularity

@@ -11,7 +11,7 @@ import numpy as np
 from ...analysis.accuracy.accuracy import Accuracy
 from ...analysis.modes.assembly_mode import AssemblyMode
 from ...analysis.modes.modes import AssemblyModes
-from ...analysis.modes.near import degrees, distance_from
+from ...analysis.modes.near_modes import degrees, distance_from
 from ...analysis.observed import ObservedRobot
 from ...analysis.verdict import CONTROLLABLE, Verdict
 from ...geometry.vectors import Array

@@ -6,7 +6,7 @@ from typing import Any
 
 from ....analysis.modes.assembly_mode import AssemblyMode
 from ....analysis.modes.modes import AssemblyModes, at_mode, modes
-from ....analysis.modes.near import NearMode
+from ....analysis.modes.near_modes import NearMode
 from ....errors import PoseReachFailure
 from ....kinematics.configuration import ClosedConfiguration
 from ....mechanism.pose import ModeNumber

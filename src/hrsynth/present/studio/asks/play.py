@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from ....analysis.configuration_report import ConfigurationAnalysis
-from ....analysis.modes.self_motions import follow_motion
 from ....errors import BadRequest
+from ....kinematics.self_motions import follow_motion
 from ....kinematics.tasks import FixedValuesTask, stack_task
 from ....kinematics.velocity_relation import ObservationModel
 from ...view.states import RealAndHiddenState

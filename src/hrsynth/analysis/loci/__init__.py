@@ -1,0 +1,1 @@
+"""Loci of tips and conditions on the pose that legs give, with their measured values fixed."""

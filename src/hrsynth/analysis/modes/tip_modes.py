@@ -1,0 +1,114 @@
+"""Methods that list modes by tips, and what decides among methods."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from ...errors import ExternalSolverFailure, HrsynthError, MissingExtra, TooLarge, UnsupportedLocus
+from ...kinematics.assembly import build_from_link_poses
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.pinocchio_model import PinocchioModel
+from ...mechanism.observations.encoder import Encoder
+from ...mechanism.sensors import make_encoders
+from ...solving.platform.pose_conditions import AtAngle
+from ...solving.platform.solve import SystemModes
+from ..loci.observation_loci import all_loci
+from ..measured import MeasuredRobot
+from ..observed import ObservedRobot
+from .branches import Model, solve_all
+from .condition_modes import PosedPlatform, most_posed, solve_posed
+
+
+def without_couplings(
+    measured: MeasuredRobot, goal: ClosedConfiguration
+) -> tuple[MeasuredRobot, ClosedConfiguration] | None:
+    """Return the robot without its couplings, at the same configuration, with its measured values fixed: so are joints
+    that couplings join to fixed motors. It has all modes of the robot, and those at which couplings are not closed.
+    None if it has no couplings, if not all dof are observed without them, or if observations are of joints that are one
+    without them."""
+    mechanism, setup = goal.model.mechanism, measured.setup
+    if not mechanism.couplings:
+        return None
+    held = {each.joint for each in measured.observation_model.observations if isinstance(each, Encoder)}
+    ties = [{each.driver, each.driven} for each in mechanism.couplings]
+    tied = set(held)
+    while more := set().union(*(tie for tie in ties if tie & tied)) - tied:
+        tied |= more
+    try:
+        loose = ObservedRobot.of(replace(setup.mechanism, couplings=(), observations=()))
+        at = build_from_link_poses(PinocchioModel(loose.mechanism, goal.model.length), goal.pose)
+    except HrsynthError:
+        return None
+    links, joints = loose.mechanism.links, loose.mechanism.joints
+    if not tied <= joints.keys() or any(
+        link not in links
+        for each in measured.observation_model.observations
+        for link in (each.link, each.seen_from or each.link)
+    ):
+        return None  # without couplings what they hold apart is one joint
+    of = {name: leg.label for leg in loose.decomposition.legs for name in leg.joints}
+    seen = (
+        *measured.observation_model.observations,
+        *(
+            each
+            for name in sorted(tied - held)
+            for each in make_encoders(loose.mechanism, loose.mechanism.joints[name], of.get(name, ""))
+        ),
+    )
+    found = MeasuredRobot(loose, loose.all_samples.measure(seen))
+    return (found, at) if found.rank == loose.dof and loose.decomposition.labels == setup.decomposition.labels else None
+
+
+def may_count_more(made: Model) -> bool:
+    """Return True if a list is that of a part of the conditions on the pose, as the sense of an axis is known besides:
+    another way may count complex modes too."""
+    system = made.system
+    return isinstance(system, PosedPlatform) and any(isinstance(c, AtAngle) and c.h == 1.0 for c in system.conditions)
+
+
+def solve_tips(
+    measured: MeasuredRobot, goal: ClosedConfiguration, exact: float, as_written: bool, time_limit: float
+) -> tuple[Model, SystemModes]:
+    """All modes by where the tips of the legs can be, with the goal known to ``exact`` (m)."""
+    confined, seen = all_loci(measured, goal)
+    # a curve that was fitted to a leg's moves is not known to hold its exact tip
+    fitted = confined.doubt is not None or any(tip.doubt is not None for tip in confined.tips)
+    confined = replace(
+        confined,
+        error=np.inf
+        if fitted
+        else max([exact, *(each.error(exact, goal) for each in seen)])
+        + max([*(tip.moved for tip in confined.tips), *(angle.moved for angle in confined.angles)]),
+        as_written=as_written,
+    )
+    return solve_all(confined, time_limit=time_limit)
+
+
+def expected_modes(measured: MeasuredRobot, at: ClosedConfiguration) -> int:
+    """Return a root bound of the modes, complex ones too, from the degrees of the legs' conditions; the largest number
+    if these are not known."""
+    try:
+        return most_posed(measured, at)
+    except (UnsupportedLocus, ExternalSolverFailure):
+        return sys.maxsize
+
+
+def count_modes(measured: MeasuredRobot, at: ClosedConfiguration) -> SystemModes:
+    """List the modes with the measured values at a configuration, without near ones, and not read as poses of the
+    robot's legs: as :func:`format_modes`, for many configurations of one robot that observes all its dof."""
+    found = None
+    if measured.generic_pattern.motion != "oriented":
+        with suppress(UnsupportedLocus, ExternalSolverFailure, TooLarge, MissingExtra):
+            found = solve_all(all_loci(measured, at)[0], near=False)[1]
+    if found is not None and found.complete:
+        return found
+    try:
+        return solve_posed(measured, at)[1]
+    except (UnsupportedLocus, ExternalSolverFailure):
+        if found is None:
+            raise
+        return found
