@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -183,3 +184,22 @@ def test_the_answer_says_what_was_proved(tmp_path: Path):
     assert "1 real of 1 complex, proved to be all among poses in space" in " ".join(text.split())
     assert "coordinates of points and directions" in text
     assert "a mode by construction, pose not proved, known to" in text
+
+
+@pytest.mark.parametrize(
+    ("name", "ways"), [("3rps", ["loci of tips"]), ("3prp", ["loci of tips", "conditions on the pose"])]
+)
+def test_ways_are_recorded_until_one_lists_all(name: str, ways: list[str]):
+    listed = hrsynth.modes(name, real=True, cone=0)
+    assert [(way.way, way.outcome == "all modes") for way in listed.tried] == [(way, way == ways[-1]) for way in ways]
+    assert [way["way"] for way in json.loads(hrsynth.to_json(listed))["ways"]] == ways
+
+
+def test_a_search_is_the_last_way(tmp_path: Path):
+    """Where time is short, each way says why it gives no list."""
+    listed = hrsynth.modes(draw("schoenflies", 0, tmp_path), cone=0, time_limit=0.01)
+    assert [way.way for way in listed.tried][-2:] == [
+        "natural coordinates, directions kept",
+        "random starts of the whole robot",
+    ]
+    assert not listed.found.complete

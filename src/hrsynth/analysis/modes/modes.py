@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Annotated, Literal, NamedTuple
@@ -11,10 +11,11 @@ import numpy as np
 
 from ...batch.pose_continuation import track_to_pose
 from ...constraints.pattern import list_placing_links
+from ...equations.natural_view import SLIDE_REACH_MAX
 from ...errors import BadRequest, ExternalSolverFailure, MissingExtra, PoseReachFailure, TooLarge, UnsupportedLocus
 from ...kinematics.assembly import Assembly, build_from_link_poses
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.goal_error import drift, is_planar
+from ...kinematics.goal_error import drift
 from ...kinematics.limits import list_joints_beyond
 from ...kinematics.self_motions import SelfMotion, self_motion
 from ...kinematics.tasks import Task
@@ -30,7 +31,6 @@ from ...tolerances import MEASUREMENT_BOUND, NEAR_POSE_DIFFERENCE_TOL
 from ..analysis_declaration import analysis
 from ..branch.joint_line import follow_line
 from ..formation import Formation
-from ..loci.carrying_leg_system import CarriedPlatform
 from ..loci.tips import TipLoci
 from ..measured import MeasuredRobot
 from ..observation_inputs import POINTS, CameraLike, LegsLike, Seed, SensorLike
@@ -84,6 +84,13 @@ class FollowedMotion(NamedTuple):
     motion: Annotated[SelfMotion, FLAT]
 
 
+class TriedWay(NamedTuple):
+    """A way to list the modes that was tried, and what came of it."""
+
+    way: str
+    outcome: str
+
+
 class MeantLegs(NamedTuple):
     """Legs whose joint centres are snapped to one point."""
 
@@ -129,6 +136,7 @@ class AssemblyModes(Result, shown_as="modes"):
     measurement_bound: Annotated[float, As("measurement_bound"), "error (rad) up to which near modes are sought"] = 0.0
     model: Model | None = None
     self_motions: tuple[SelfMotion, ...] = ()
+    tried: Annotated[tuple[TriedWay, ...], As("ways"), "ways to list the modes, in the order tried"] = ()
     antipodal: tuple[AssemblyMode, ...] = ()
     """Solutions of the same equations with the opposite value of an observation."""
     formation: Annotated[Formation | None, Formation, OPTIONAL] = None
@@ -145,21 +153,15 @@ class AssemblyModes(Result, shown_as="modes"):
         """Poses among which these modes are all."""
         if self.formation is not None:
             return WITHIN["formation"]
+        if self.model is None:
+            return None
+        system = self.model.system
+        if isinstance(system, NaturalPlatform):
+            reach = f", within {SLIDE_REACH_MAX:g} characteristic lengths" * system.is_reach_assumed
+            return WITHIN[system.motion] + reach
         if self.confined is not None:
             return WITHIN[self.confined.motion]
-        system = None if self.model is None else self.model.system
-        motion = (
-            system.poses.motion
-            if isinstance(system, PosedPlatform)
-            else "planar"
-            if isinstance(system, NaturalPlatform) and is_planar(self.goal.model.mechanism)
-            else "kept"
-            if isinstance(system, NaturalPlatform) and system.kept
-            else "spatial"
-            if isinstance(system, CarriedPlatform | NaturalPlatform)
-            else None
-        )
-        return None if motion is None else WITHIN[motion]
+        return WITHIN[system.poses.motion if isinstance(system, PosedPlatform) else "spatial"]
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -349,9 +351,10 @@ def modes(
         wanted = motion.goal(asked, setup.robot.name)
         goal = track_to_pose(goal, setup.all_samples.observation_model, asked, motion)
     measured = MeasuredRobot.of(setup, real)
-    found = _list_modes(setup, measured, goal, wanted, real, as_written, time_limit)
+    tried = list[TriedWay]()
+    found = _list_modes(setup, measured, goal, wanted, real, as_written, time_limit, tried)
     near = near_modes(setup, goal, measured.observation_model, found.modes, found.candidates, bound)
-    return replace(found, candidates=(), near_modes=near, measurement_bound=bound)
+    return replace(found, candidates=(), near_modes=near, measurement_bound=bound, tried=tuple(tried))
 
 
 def _list_modes(
@@ -362,6 +365,7 @@ def _list_modes(
     real: bool,
     as_written: bool,
     time_limit: float,
+    tried: list[TriedWay],
 ) -> AssemblyModes:
     """List the modes of the numbers as they are, with starts of near ones."""
     motion = setup.motion
@@ -381,14 +385,17 @@ def _list_modes(
             self_motions=() if own is None else (own,),
         )
     report("modes")
+
+    def search_all(reason: str) -> AssemblyModes:
+        tried.append(TriedWay("random starts of the whole robot", reason))
+        return _modes_by_search(setup, measured.observation_model, goal, pose, kind, reason)
+
     try:
         if not as_written and _is_on_self_motion(setup, measured.observation_model, goal):
-            return _modes_by_search(
-                setup, measured.observation_model, goal, pose, kind, "the pose lies on a self-motion"
-            )
-        listed = _modes_by_system(setup, measured, goal, wanted, pose, kind, as_written, time_limit)
+            return search_all("the pose lies on a self-motion")
+        listed = _modes_by_system(setup, measured, goal, wanted, pose, kind, as_written, time_limit, tried)
     except (UnsupportedLocus, ExternalSolverFailure, TooLarge, MissingExtra) as error:
-        return _modes_by_search(setup, measured.observation_model, goal, pose, kind, error.reason)
+        return search_all(error.reason)
     moving = (
         not listed.found.complete
         and not as_written
@@ -399,14 +406,13 @@ def _list_modes(
     )
     if not moving and not listed.found.open:
         return listed
-    why = (
+    found = search_all(
         "some of the solutions lie on a self-motion"
         if moving
         else "the equations depend on each other"
         if listed.found.continuous_family is not None
         else str(listed.found.singular_solutions)
     )
-    found = _modes_by_search(setup, measured.observation_model, goal, pose, kind, why)
     return (
         found
         if moving or not any(mode.proved for mode in listed.modes)
@@ -551,6 +557,7 @@ def _modes_by_system(
     kind: str,
     as_written: bool,
     time_limit: float,
+    tried: list[TriedWay],
 ) -> AssemblyModes:
     """List the modes as the solutions of the system of the tips' loci, or else of the conditions of the legs'
     joints, or else in natural coordinates."""
@@ -558,25 +565,27 @@ def _modes_by_system(
     answers = list[tuple[Model, SystemModes]]()
     exact = drift(goal, wanted, setup.normal.moved)
     free = without_couplings(measured, goal)
-    tips, asked, natural, narrower = (
-        partial(solve_tips, as_written=as_written, time_limit=time_limit),
-        partial(solve_posed, time_limit=time_limit),
-        partial(solve_natural, time_limit=time_limit),
-        partial(solve_natural, time_limit=time_limit, keeps=True),
-    )
-    ways = (natural, tips, asked, solve_carried) if free else (tips, asked, natural, solve_carried)
-    for way in (*ways, narrower):
-        if way is narrower and any(answer[1].complete for answer in answers):
+    ways: dict[str, Callable[..., tuple[Model, SystemModes]]] = {
+        "natural coordinates": partial(solve_natural, time_limit=time_limit),
+        "loci of tips": partial(solve_tips, as_written=as_written, time_limit=time_limit),
+        "conditions on the pose": partial(solve_posed, time_limit=time_limit),
+        "a leg that carries the platform": solve_carried,
+        "natural coordinates, directions kept": partial(solve_natural, time_limit=time_limit, keeps=True),
+    }
+    names = [*ways]
+    for name in names if free else [*names[1:3], names[0], *names[3:]]:
+        if name.endswith("kept") and any(answer[1].complete for answer in answers):
             break
-        is_whole = way in (natural, narrower)
-        if not is_whole and not setup.decomposition.is_platform_decided:
-            reasons.append(UnsupportedLocus(setup.robot.name, "joints inside its platform allow several poses of it"))
-            continue
+        is_whole = name.startswith("natural")
         try:
-            answers.append(way(*(free if free and not is_whole else (measured, goal)), exact))
+            if not is_whole and not setup.decomposition.is_platform_decided:
+                raise UnsupportedLocus(setup.robot.name, "joints inside its platform allow several poses of it")
+            answers.append(ways[name](*(free if free and not is_whole else (measured, goal)), exact))
         except (UnsupportedLocus, ExternalSolverFailure, TooLarge, MissingExtra) as error:
             reasons.append(error)
+            tried.append(TriedWay(name, error.reason))
         else:
+            tried.append(TriedWay(name, answers[-1][1].outcome))
             if answers[-1][1].complete and not may_count_more(answers[-1][0]):
                 break
     if not answers:

@@ -56,6 +56,8 @@ class NaturalPlatform(System):
     """True if directions that no sample turns are held."""
     point: Array | None = None
     """The platform, if it is a point (3,) of its link, in the link's frame (m)."""
+    is_reach_assumed: bool = False
+    """True if points that only slides bound are taken to be within ``SLIDE_REACH_MAX``."""
 
     freedoms = 6
 
@@ -63,6 +65,11 @@ class NaturalPlatform(System):
     def size(self) -> float:
         """The unit of lengths (m)."""
         return self.goal.model.length
+
+    @property
+    def motion(self) -> str:
+        """Return the kind of poses among which modes are sought: ``planar``, ``kept`` or ``spatial``."""
+        return "planar" if is_planar(self.goal.model.mechanism) else "kept" if self.kept else "spatial"
 
     def place(self, link: str, x: Array) -> Array:
         """Return the pose (4, 4) of a link at x; of one with a single direction one of those with its image."""
@@ -170,7 +177,8 @@ def _read(measured: MeasuredRobot, goal: ClosedConfiguration, error: float, kept
     for link in mechanism.links if mechanism.couplings else bodies:
         if link not in view.links or view.groups[view.links[link][0]][0].shape[1] < 2 - (point is not None):
             raise UnsupportedLocus(name, f"the joints do not place {link}")
-    return NaturalPlatform((), np.zeros((0, 3)), goal, view, bodies, kept, point, error=error)
+    is_reach_assumed = bool(np.any(view.farthest >= SLIDE_REACH_MAX))
+    return NaturalPlatform((), np.zeros((0, 3)), goal, view, bodies, kept, point, is_reach_assumed, error=error)
 
 
 def _count_serial_dof(mechanism: Mechanism, leg: Leg) -> int:
@@ -212,10 +220,9 @@ def _list_kept_directions(
 
 
 def _solve(system: NaturalPlatform) -> tuple[Model, SystemModes]:
-    """Return the modes, each pose once, the goal first."""
+    """Return the modes, each pose once."""
     if not _is_isolated(system.view):
         raise ExternalSolverFailure("natural coordinates", "the goal is not isolated, to rounding")
-    is_reach_assumed = bool(np.any(system.view.farthest >= SLIDE_REACH_MAX))
     for narrowed in (False, True):
         view, solver = system.view, QuadricSolver()
         boxes, others = solver.solve(view.matrices, view.errors, view.farthest)
@@ -228,42 +235,15 @@ def _solve(system: NaturalPlatform) -> tuple[Model, SystemModes]:
             raise ExternalSolverFailure("natural coordinates", "a box may hold several solutions")
         system = replace(system, view=narrower)
     assert unique is not None
-    n, m, modes = len(view.goal), solver.left, list[SystemMode]()
-    for x, radii in unique:
-        shift, turn = system.bound_shift(radii)
-        close = [k for k, mode in enumerate(modes) if system.compare(mode.q, x) < SAME_POSE_TOL]
-        at_goal = bool(np.all(np.abs(view.goal - x) <= radii))
-        mode = SystemMode(
-            (),
-            max(shift / system.size, turn),
-            shift,
-            turn,
-            float(np.abs(evaluate_quadrics(view.matrices, x)[0]).max(initial=0.0)),
-            freeze_array(system.place(system.links[0], x)),
-            freeze_array(x),
-            proved=at_goal,
-            match_residual=not at_goal,
-        )
-        if not close:
-            modes.append(mode)
-        else:  # legs that are assembled in several ways: not known to be one pose
-            first, apart = mode if at_goal else modes[close[0]], system.compare(modes[close[0]].q, x)
-            modes[close[0]] = replace(
-                first,
-                radius=max(first.radius, mode.radius) + apart,
-                shift=max(first.shift, shift) + apart * system.size,
-                turn=max(first.turn, turn) + apart,
-                proved=False,
-                match_residual=True,
-            )
+    modes = _list_poses(system, unique)
     if not any(np.all(np.abs(view.goal - mode.q) <= SAME_POSE_TOL) for mode in modes):
         raise ExternalSolverFailure("natural coordinates", "the goal is in none of the boxes")
     # combinations of a low degree may leave points that are no solutions
     complex_points = [x for x in others if _compute_residual(view, x) <= COMPLEX_RESIDUAL_MAX]
     count = system.count_poses([*(mode.q for mode in modes), *complex_points])
     proof = (
-        f"{n} coordinates of points and directions, {m} of them left by linear equations: all real solutions"
-        + f" within {SLIDE_REACH_MAX:g} characteristic lengths" * is_reach_assumed
+        f"{len(view.goal)} coordinates of points and directions, {solver.left} of them left by linear equations: "
+        f"all real solutions{f' within {SLIDE_REACH_MAX:g} characteristic lengths' * system.is_reach_assumed}"
         + f" are in {len(boxes)} box{'es' * (len(boxes) != 1)}"
         + f" of {solver.cases} cases" * (solver.cases > 1)
         + f", by combinations of the equations up to degree {solver.degree}" * bool(solver.degree)
@@ -273,6 +253,40 @@ def _solve(system: NaturalPlatform) -> tuple[Model, SystemModes]:
     # legs that are closed one by one need not meet couplings
     coupled = system.goal.model.mechanism.couplings
     return Model(system, system.place_all, view.goal, closing=system.close if coupled else None), listed
+
+
+def _list_poses(system: NaturalPlatform, unique: Sequence[tuple[Array, Array]]) -> list[SystemMode]:
+    """Return a mode for each pose of the platform among middles and radii of boxes with one solution at most."""
+    modes = list[SystemMode]()
+    for x, radii in unique:
+        shift, turn = system.bound_shift(radii)
+        at_goal = bool(np.all(np.abs(system.view.goal - x) <= radii))
+        mode = SystemMode(
+            (),
+            max(shift / system.size, turn),
+            shift,
+            turn,
+            float(np.abs(evaluate_quadrics(system.view.matrices, x)[0]).max(initial=0.0)),
+            freeze_array(system.place(system.links[0], x)),
+            freeze_array(x),
+            proved=at_goal,
+            match_residual=not at_goal,
+        )
+        same = next((k for k, known in enumerate(modes) if system.compare(known.q, x) < SAME_POSE_TOL), None)
+        if same is None:
+            modes.append(mode)
+        else:  # legs that are assembled in several ways: not known to be one pose
+            known = modes[same]
+            first, apart = mode if at_goal else known, system.compare(known.q, x)
+            modes[same] = replace(
+                first,
+                radius=max(first.radius, mode.radius, known.radius) + apart,
+                shift=max(first.shift, mode.shift, known.shift) + apart * system.size,
+                turn=max(first.turn, mode.turn, known.turn) + apart,
+                proved=False,
+                match_residual=True,
+            )
+    return modes
 
 
 def _compute_residual(view: NaturalView, x: Array) -> float:

@@ -123,6 +123,11 @@ class SystemModes(Value):
     open: bool = False
     """True if no choice of legs has finitely many solutions, for some leg solutions at least."""
 
+    @property
+    def outcome(self) -> str:
+        """Return whether all modes are proved to be listed, as text."""
+        return "all modes" if self.complete else self.singular_solutions or "found, not proved to be all"
+
     @classmethod
     def of_more(cls, modes: Sequence[SystemMode], out: Sequence[SystemMode], proof: str, bound: str) -> SystemModes:
         """Return the modes of a square part with further conditions, all of whose zeros are known: its real zeros
