@@ -6,12 +6,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 from hrsynth.geometry.vectors import Array, times
-from hrsynth.solving.newton import approach_zeros, collect_zeros, solve_squares
+from hrsynth.solving.newton import approach_zeros, solve_squares
 
 
 def powers(x: Array, wanted: Array) -> tuple[Array, Array]:
@@ -104,43 +104,3 @@ def test_a_singular_matrix_does_not_spoil_the_others() -> None:
     for k in (0, 1, 3):
         assert times(J[k], found[k]) == pytest.approx(F[k])
     assert found[2] == pytest.approx(np.linalg.pinv(J[2]) @ F[2])
-
-
-@given(st.integers(2, 6), st.integers(0, 2**32 - 1))
-def test_all_zeros_of_a_polynomial_are_collected(degree: int, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    p = np.polynomial.Polynomial([*rng.normal(size=degree), 1.0])
-    wanted = p.roots()
-    apart = np.abs(wanted[:, None] - wanted) + np.diag([np.inf] * degree)
-    assume(apart.min() > 1e-2)
-
-    def evaluate(x: Array) -> tuple[Array, Array]:
-        return p(x), p.deriv()(x)[..., None]
-
-    # around all zeros every one has a channel of starts (J. Hubbard, D. Schleicher, S. Sutherland, Invent. math. 2001)
-    radius = 1.0 + np.abs(p.coef).max()
-    starts = (radius * np.exp(2j * np.pi * rng.random((32, 1))) for _ in range(40))
-    found = collect_zeros((approach_zeros(evaluate, x, steps=120) for x in starts), degree)
-    assert len(found) == degree
-    assert all(np.abs(found[:, 0] - each).min() < 1e-8 for each in wanted)
-
-
-def test_no_more_batches_are_taken_than_needed() -> None:
-    def evaluate(x: Array) -> tuple[Array, Array]:
-        return np.sin(x), np.cos(x)[..., None]
-
-    ends = iter([approach_zeros(evaluate, np.array([[k * np.pi + 0.1j]]), steps=20) for k in (0, 0, 1, 1, 2, 3)])
-    assert collect_zeros(ends, 3).real == pytest.approx(np.pi * np.array([[0.0], [1.0], [2.0]]))
-    assert len(list(ends)) == 1
-
-
-def test_a_partner_comes_with_its_zero_and_distances_are_as_asked_for() -> None:
-    def evaluate(x: Array) -> tuple[Array, Array]:
-        return np.sin(x), np.cos(x)[..., None]
-
-    starts = np.pi * np.arange(6.0)[:, None] + 0.1 + 0j
-    ends = approach_zeros(evaluate, starts, steps=20)
-    assert len(collect_zeros([ends])) == 6
-    turned = collect_zeros([ends], measure=lambda x, y: np.abs(np.exp(1j * x) - np.exp(1j * y)).max(axis=1))
-    assert len(turned) == 2
-    assert len(collect_zeros([ends], partner=lambda x: x + 0.5)) == 12

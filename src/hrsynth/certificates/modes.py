@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.loci.carrying_leg_system import CarriedPlatform
 from ..analysis.measured import MeasuredRobot
 from ..analysis.modes.modes import AssemblyModes, modes
 from ..analysis.modes.natural_modes import NaturalPlatform, solve_natural
@@ -25,11 +24,9 @@ from ..geometry.vectors import Array
 from ..kinematics.goal_error import drift
 from ..mechanism import Mechanism
 from ..mechanism.pose import Pose
-from ..solving.platform.quadrics import WorkingFrame
 from ..solving.platform.solve import SystemModes
 from . import verify_solutions
 from .bounds import bound
-from .chains import write_chain
 from .closures import ClosedRobot, write_numbers
 from .proposed import ProposedRecord
 from .refining import Polynomial, ScaledEquations
@@ -64,8 +61,6 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
         return build_solutions_certificate(found, found.model.system, about)
     robot = ClosedRobot.of(found)
     try:
-        if found.found.complete and found.model is not None and isinstance(found.model.system, CarriedPlatform):
-            return of_chain(found.model.system, found, about, robot)
         return of_systems(found.found, about, robot)
     except CertificateRejection as reason:
         if found.found.complete and (natural := _list_again(found)) is not None:
@@ -116,27 +111,6 @@ def of_systems(found: SystemModes, about: Mapping[str, Any], robot: ClosedRobot 
         robot,
         sum(each.roots.complex if each.part.whole else sum(each.kept) for each in found.solved),
     )
-
-
-def of_chain(
-    system: CarriedPlatform, found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot | None
-) -> dict[str, Any]:
-    """The certificate of a platform that a leg carries; raises ``CertificateRejection``."""
-    assert found.model is not None
-    modes_ = found.found.modes
-    frame = WorkingFrame(system.middle.origin, system.rows, system.size, system.rows[2])
-    chain = write_chain(system, [mode.q for mode in modes_])
-    kept = [mode is not None for mode in chain.modes]
-    if sum(kept) < len(modes_):
-        raise CertificateRejection(
-            f"{len(chain.starts)} solutions were enclosed, {sum(kept)} of {len(modes_)} modes among them"
-        )
-    R, p = system.transform(chain.home, system.carrying)
-    there = [None if k is None else system.transform(modes_[k].q, system.carrying) for k in chain.modes]
-    poses = [np.empty(0) if to is None else np.column_stack([to[0] @ R.T, to[1] - to[0] @ R.T @ p]) for to in there]
-    bodies = [None if k is None else found.model.bodies(modes_[k].q) for k in chain.modes]
-    made = _system(ProposedRecord(chain.record, chain.starts, poses, kept, bodies, frame), robot)
-    return _seal([made], about, robot, found.found.complex or 0)
 
 
 def _seal(
@@ -190,7 +164,7 @@ def _system(proposed: ProposedRecord, robot: ClosedRobot | None) -> dict[str, An
                 if "places" not in record:
                     tips = [
                         [value(p, middle)[0] / value(w, middle)[0] for p in N]
-                        for N, _, w in points[: 3 if record["kind"] == "chain" else len(record["tips"])]
+                        for N, _, w in points[: len(record["tips"])]
                     ]
                     record["places"] = robot.places(
                         record.get("bodies", [0] * len(tips)),

@@ -207,8 +207,8 @@ def turned(u, v):  # the product of quaternions
     return [minus(mul(u[0], v[0]), inner(u[1:], v[1:])), *(add(mul(u[0], y), mul(v[0], x), z) for x, y, z in rest)]
 
 
-def placed(e, g, b, kappa=None):  # |e|^2 R b; |e|^2 tip = that + 2 vec(g e*), its square over |e|^2, and |e|^2
-    back, w, gg = [e[0], *(times(-1, p) for p in e[1:])], inner(e, e), minus(inner(g, g), kappa or {})
+def placed(e, g, b, kappa):  # |e|^2 R b; |e|^2 tip = that + 2 vec(g e*), its square over |e|^2, and |e|^2
+    back, w, gg = [e[0], *(times(-1, p) for p in e[1:])], inner(e, e), minus(inner(g, g), kappa)
     arrow = turned(turned(e, [{}, *({tuple(0 * k for k in next(iter(w))): c} for c in b)]), back)[1:]
     Q = add(times(4, gg), *(times(4 * c, p) for c, p in zip(b, turned(back, g)[1:])), times(dot(b, b), w))
     return arrow, ([add(p, times(2, q)) for p, q in zip(arrow, turned(g, back)[1:])], Q, w)
@@ -235,43 +235,10 @@ def pose(system, tips):
     return found, [False] * n, points, []
 
 
-def chain(system, tips):
-    """Turns and slides from the base on: dual quaternions 1 + t h, h = a + eps o x a or eps a / 2. Three tips are the
-    platform's, behind the first of ``ends``; others are points, or arrows, that some joints carry."""
-    joints, ((last,), *ends) = [(kind, *rational(v)) for kind, *v in system["joints"]], system["ends"]
-    n, rows = len(joints), []
-    t, halves = [term(1, n, k) for k in range(n)], [joint[0] == "R" for joint in joints]
-
-    def carried(start, end):
-        e, g = [term(1, n), {}, {}, {}], [{}] * 4
-        for (kind, a, o), x in list(zip(joints, t))[start:end]:
-            turn, slide = (a, cross(o, a)) if kind == "R" else ([0] * 3, [c / 2 for c in a])
-            p, q = [term(1, n), *(times(c, x) for c in turn)], [{}, *(times(c, x) for c in slide)]
-            e, g = turned(e, p), [*map(add, turned(e, q), turned(g, p))]
-        return e, g
-
-    need(
-        all(kind in ("R", "P") and dot(a, a) == 1 for kind, a, _ in joints)
-        and 0 < last <= n
-        and any(cross(sub(tips[1], tips[0]), sub(tips[2], tips[0]))),
-        "turns and slides along vectors of length 1, a platform",
-    )
-    for b, (start, end, arrow), reach in zip(tips[3:], ends, map(reach_of, system["reaches"]), strict=True):
-        need(
-            0 <= start < end <= n and reach[0] in ("plane", "sphere")[: 2 - bool(arrow)],
-            "the joints and locus of a tip",
-        )
-        turn, point = placed(*carried(start, end), b)
-        rows += [(*each, point[2]) for each in conditions((turn, {}, point[2]) if arrow else point, reach)]
-    points = [placed(*carried(0, end), b)[1] for end, b in zip([last] * 3 + [n], tips[:3] + tips[:1])]
-    return [formal(p, w) for p, _, w in rows[:n]], halves, points, [misfits([row[:2]]) for row in rows[n:]]
-
-
 KINDS = {
     "spatial": (spatial, "square"),
     "shifting": (shifting, "square bodies slide"),
     "pose": (pose, "chart arrows hub"),
-    "chain": (chain, "joints ends"),
 }
 
 
@@ -306,14 +273,6 @@ def most_of(p, m, r):
 
 def least(p, m, r):
     return size(value(p, m)) / 2 - change(p, m, r)  # of |p| in the box
-
-
-def differ(p, w, m, r, k, s):  # whether p / w surely has other values in two boxes
-    off = sum(
-        change(f, x, a) * most_of(g, y, b) + most_of(f, x, a) * change(g, y, b)
-        for f, x, a, g, y, b in ((p, m, r, w, k, s), (w, m, r, p, k, s))
-    )
-    return size(sub(along([value(p, m)], [value(w, k)]), along([value(p, k)], [value(w, m)]))) / 2 > off
 
 
 def along(y, z):
@@ -397,7 +356,7 @@ def modes(record):
         equations = [integral(p) for p in equations]
         need(len(equations) == len(halves), f"{len(equations)} equations in {len(halves)} unknowns")
         need((equations, legs) not in seen, "a system that is given twice")
-        boxes, counted, seen = [], [], [*seen, (equations, legs)]
+        boxes, seen = [], [*seen, (equations, legs)]
         flat = [times(Fraction(1, 2 ** max(map(abs, p.values())).bit_length()), p) for p in equations]
         bound = {"rank": rank, "poses": poses}[system["bound"]["kind"]](equations, halves, system)
         need(len(system["boxes"]) == bound, f"{len(system['boxes'])} boxes, but there may be {bound} solutions")
@@ -422,15 +381,7 @@ def modes(record):
             else:
                 need(any(abs(v) > r for _, v in m), "a box that may be real has no pose")
                 need(finite and not legs, "a box that may or may not be a pose")
-            real, counted = real + ("pose" in each), counted + [(m, r)] * (not away and "misses" not in each)
-        own, complex_ = points[:3] if system["kind"] == "chain" else [], complex_ + len(counted)
-        need(
-            all(
-                any(differ(p, w, *one, *other) for N, _, w in own for p in N) or not own
-                for one, other in combinations(counted, 2)
-            ),
-            "two closings may be of one pose",
-        )
+            real, complex_ = real + ("pose" in each), complex_ + (not away and "misses" not in each)
         for (m, r), (k, s) in combinations(boxes, 2):
             need(any(max(abs(a - c), abs(b - d)) > r + s for (a, b), (c, d) in zip(m, k)), "two boxes touch")
     need(seen and record["real"] == real and record["complex"] == complex_, f"{real} real of {complex_} are proved")
@@ -444,7 +395,6 @@ def modes(record):
 def fair(system, tips):  # has its kind's keys; lengths in units of about its size (translation along planes: any)
     need(system.keys() <= {*f"kind reaches tips boxes bound places {KINDS[system['kind']][1]}".split()}, "another key")
     need(len(tips) < 50 and all(len(b) == 3 for b in tips), "tips of another dimension, or too many")
-    need(len(system.get("joints", ())) < 9, "more than 8 joints")
     reaches = [reach_of(each) for each in system["reaches"]]
     radii = [v[1] for kind, v in reaches if kind in ("circle", "sphere")]
     spans = [sub(b, places[0]) for places in (tips, [v[0] for _, v in reaches]) for b in places]
@@ -500,7 +450,7 @@ def closes(robot, links):  # its joints fit to 1e-9 with links displaced since z
 def told(system, each, points, tips, m, r):  # whether the pose puts the tips where the box does
     turn, P, within = turn_of(rational(each["pose"])), rational(each["pose"]), rational(each["within"])
     need(within <= WITHIN and (system["kind"] != "shifting" or all(turn[i][i] == 1 for i in range(3))), "another pose")
-    arrows, bodies = system.get("arrows", 0), system.get("bodies", [0] * (3 if system["kind"] == "chain" else 50))
+    arrows, bodies = system.get("arrows", 0), system.get("bodies", [0] * 50)
     for k, (b, (N, _, w), body) in enumerate(zip(tips, points, bodies)):
         start = rational(system["hub"]) if k >= len(tips) - arrows else [row[3] for row in P]
         at = [value(p, m)[0] / value(w, m)[0] for p in N]

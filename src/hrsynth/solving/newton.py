@@ -1,8 +1,8 @@
-"""Newton's method from many starts at once, real or complex, and the distinct zeros that random starts lead to."""
+"""Newton's method from many starts at once, real or complex."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from ..geometry.vectors import Array
 
-SAME_ZERO_DISTANCE_TOL = 1e-6
-"""Distance, relative to 1 plus the unknowns, below which two approached zeros are one."""
 LAST_NEWTON_STEP_TOL = 1e-10
 """Step, relative to 1 plus the unknowns, from which on a zero is approached."""
 
@@ -85,34 +83,3 @@ def approach_zeros(
                 converged[live] = short & (error_tol == 0.0)
                 live = live[np.isfinite(size) & ~converged[live]]
     return ApproachedZeros(x, errors, converged | (errors < error_tol))
-
-
-def collect_zeros(
-    ends: Iterable[ApproachedZeros],
-    enough: float = np.inf,
-    partner: Callable[[Array], Array] = np.conj,
-    measure: Callable[[Array, Array], Array] = lambda x, y: np.abs(x - y).max(axis=1) / (1.0 + np.abs(y).max()),
-) -> Array:
-    """Return the distinct zeros (k, n) that were approached, each with its partner, until there are enough.
-
-    Parameters
-    ----------
-    ends
-        Those of batches of starts, taken one after another as far as they are needed.
-    enough
-        Number of zeros from which no further batch is taken.
-    partner
-        Zeros (c, n) that go with zeros (c, n): of real equations the conjugates.
-    measure
-        Distances (c,) of zeros (c, n) from one (n,), by default relative ones.
-    """
-    zeros = np.zeros((0, 0), dtype=complex)
-    for batch in ends:
-        x = batch.x[batch.converged]
-        zeros = zeros.reshape(-1, x.shape[1])
-        for y in np.stack([x, partner(x)], axis=1).reshape(-1, x.shape[1]):
-            if not np.any(measure(zeros, y) < SAME_ZERO_DISTANCE_TOL):
-                zeros = np.vstack([zeros, y])
-        if len(zeros) >= enough:
-            break
-    return zeros

@@ -11,13 +11,7 @@ import hrsynth
 from analysis.modes.ankles import LEGS, ankle, carried, counted
 from analysis.modes.test_robots import check_completeness, check_modes, same_modes
 from analysis.modes.test_surfaces import needs_msolve
-from hrsynth.analysis.loci.carrying_leg import carried_platform
-from hrsynth.analysis.loci.joint_forms import closings_bound, eigenvalues
-from hrsynth.analysis.measured import MeasuredRobot
-from hrsynth.analysis.modes.carrying_leg_modes import polish_zeros, proposals
-from hrsynth.errors import UnsupportedLocus
-from hrsynth.geometry.vectors import build_pose, rotate_about_axis
-from hrsynth.mechanism.model import Motor
+from hrsynth.geometry.vectors import build_pose
 from strategies import random_rotation, transformed
 
 
@@ -78,7 +72,7 @@ def test_twenty_ankles(kind: str):
 @pytest.mark.parametrize(("word", "count"), [("RR", 8), ("RP", 6), ("PR", 6)])
 def test_a_platform_that_a_random_leg_carries_has_its_number_of_modes(word: str, count: int):
     real = []
-    for seed in range(2, 5):
+    for seed in range(3, 7):
         found = hrsynth.modes(carried(word, seed), real=True)
         assert (found.found.complex, found.found.complete) == (count, True)
         check_modes(found)
@@ -98,58 +92,14 @@ def test_a_ball_on_a_joint_of_the_leg_that_carries_halves_them(word: str, end: s
     check_completeness(found, 20)
 
 
-@pytest.mark.some(0, 1)
-@pytest.mark.parametrize(
-    ("word", "on", "count"),
-    [("RRR", None, 40), ("RRP", None, 28), ("PRR", None, 28), ("RRR", (0, "foot"), 32), ("RRR", (1, "end"), 32)],
-)
-def test_three_joints_and_three_balls_have_their_number_of_modes(word: str, on: tuple[int, str] | None, count: int):
-    """By ranks; a general leg of three R leaves as many as six balls do."""
-    for seed in range(2):
-        found = hrsynth.modes(carried(word, seed, on), real=True)
-        assert (found.found.complex, found.found.complete, found.found.bound) == (count, True, "rank")
-        check_modes(found)
-        check_completeness(found, 40)
-
-
-@pytest.mark.some(1)
-@pytest.mark.parametrize("word", ["RR", "PR", "RP"])
-def test_ranks_and_degrees_leave_the_same_number(word: str):
-    for seed in range(2, 4):
-        measured = MeasuredRobot.of(hrsynth.observe(carried(word, seed)), real=True)
-        system = carried_platform(measured, measured.setup.all_samples.start, 1e-12)
-        counted = closings_bound(system, system.square)
-        assert counted is not None
-        assert counted.most == system.most(system.square)
-        found = polish_zeros(system, [eigenvalues(system, system.square, counted)])
-        others = proposals(system, counted.most)
-        assert len(found) == len(others) == counted.most
-        for q in others:
-            assert min(np.abs(system.unknowns(q) - system.unknowns(each)).max() for each in found) < 1e-6
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_how_a_robot_stands_does_not_change_what_its_leg_leaves(seed: int):
-    """Two parallel hinges leave 6 closings by ranks, also where they are parallel to rounding only."""
-    rng, robot, axis = np.random.default_rng(seed), carried("RR", 2), np.array([0.0, 0.0, 1.0])
-    robot = robot.changed(joints=[replace(robot.joints[f"joint_{k}"], axes=(axis,)) for k in range(2)])
-    R = random_rotation(rng)
-    measured = MeasuredRobot.of(hrsynth.observe(transformed(robot, R, rng.normal(size=3)), samples=4), real=True)
-    system = carried_platform(measured, measured.setup.all_samples.start, 1e-12)
-    counted = closings_bound(system, system.square)
-    assert counted is not None
-    assert counted.most == 6
-    q = rng.normal(size=2)
-    moved = system.pose(q) @ np.linalg.inv(system.pose(0 * q))
-    assert min(np.abs(moved[:3, :3] - rotate_about_axis(R @ axis, sign * q.sum())).max() for sign in (1, -1)) < 1e-12
-
-
-def test_motors_on_all_joints_of_a_leg_leave_it_no_way():
-    robot = carried("RR", 2)
-    driven = robot.changed(joints=[replace(robot.joints[f"joint_{k}"], motor=Motor(f"motor_{k}")) for k in range(2)])
-    measured = MeasuredRobot.of(hrsynth.observe(driven, samples=4), real=True)
-    with pytest.raises(UnsupportedLocus):
-        carried_platform(measured, measured.setup.all_samples.start, 1e-12)
+@pytest.mark.slow
+@pytest.mark.parametrize("word", ["RRR", "PRR"])
+def test_what_three_joints_and_three_balls_leave_is_found(word: str):
+    """With 40 and 28 complex modes: not confined, and not proved."""
+    found = hrsynth.modes(carried(word, 0), real=True)
+    assert (found.found.complex, found.found.complete) == (None, False)
+    assert any(mode.goal for mode in found.modes)
+    check_modes(found)
 
 
 @pytest.mark.long

@@ -14,7 +14,6 @@ from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.modes.assembly_mode import AssemblyMode
 from hrsynth.analysis.modes.branches import MODES_TIME_LIMIT_S, Model
-from hrsynth.analysis.modes.carrying_leg_modes import solve_carried
 from hrsynth.analysis.modes.condition_modes import solve_posed
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.analysis.modes.natural_modes import solve_natural
@@ -460,7 +459,6 @@ def moved_since_zero(found: AssemblyModes, at: ClosedConfiguration, joint: Joint
 WAYS = {
     "tips": partial(solve_tips, as_written=False, time_limit=MODES_TIME_LIMIT_S),
     "conditions": solve_posed,
-    "carrier": solve_carried,
     "natural": solve_natural,
 }
 
@@ -469,7 +467,7 @@ WAYS = {
 @pytest.mark.parametrize("name", sorted(list_robots()))
 def test_all_ways_list_the_same(name: str):
     """The known patterns and the general ways, wherever several of them prove a list: the same poses, and as many
-    complex ones (a carried platform with more conditions than needed counts those that all of them meet)."""
+    complex ones."""
     robot = load(list_robots()[name])
     sets = [*dict.fromkeys([None, *legs(robot).minimal[:2]]), "motors"]
     for observe in sets:
@@ -488,11 +486,7 @@ def test_all_ways_list_the_same(name: str):
         (first, one), *_ = listed.values()
         # without links whose directions are known, natural coordinates list other operation modes too
         narrower = measured.generic_pattern.motion not in ("planar", "spatial")
-        counts = {
-            found.complex
-            for way, (_, found) in listed.items()
-            if way != "carrier" and not (narrower and way == "natural")
-        }
+        counts = {found.complex for way, (_, found) in listed.items() if not (narrower and way == "natural")}
         assert len(counts) <= 1, (observe, counts)
         for way, (made, found) in listed.items():
             assert len(found.modes) == len(one.modes) or (way == "natural" and narrower), (observe, way)

@@ -38,7 +38,6 @@ from ..observed import ObservedRobot, RobotLike
 from ..setup_records import LIMITS_IGNORED
 from .assembly_mode import AssemblyMode, ModeReader, found_mode
 from .branches import MODES_TIME_LIMIT_S, Model
-from .carrying_leg_modes import solve_carried
 from .condition_modes import PosedPlatform, solve_posed
 from .formation_modes import formation_modes
 from .mode_search import FoundMode, has_unobserved_motion, search
@@ -569,7 +568,6 @@ def _modes_by_system(
         "natural coordinates": partial(solve_natural, time_limit=time_limit),
         "loci of tips": partial(solve_tips, as_written=as_written, time_limit=time_limit),
         "conditions on the pose": partial(solve_posed, time_limit=time_limit),
-        "a leg that carries the platform": solve_carried,
         "natural coordinates, directions kept": partial(solve_natural, time_limit=time_limit, keeps=True),
     }
     names = [*ways]

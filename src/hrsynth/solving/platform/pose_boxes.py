@@ -229,23 +229,6 @@ def told_far(boxes: Iterable[PoseBox]) -> str:
     return f", {far} far from real ones for the rounded geometry" if far else ""
 
 
-def zeros(equations: Sequence[Polynomial], proposed: Iterable[Array]) -> tuple[list[PoseBox], int]:
-    """Boxes of common zeros near those that are proposed (n,), apart from each other, and how many have none."""
-    from flint import acb, arb, ctx
-
-    found, lost = list[PoseBox](), 0
-    with ctx.workprec(POSE_BOX_BITS_COUNT):
-        for x in proposed:
-            real = bool(np.abs(x.imag).max(initial=0.0) < NEARLY_REAL_POSE_TOL * (1.0 + np.abs(x).max(initial=0.0)))
-            start = [arb(v) for v in x.real.tolist()] if real else [acb(v.real, v.imag) for v in x.tolist()]
-            box = as_box(enclose_zero(equations, start), real, 0)
-            if box is None:
-                lost += 1
-            elif box.is_disjoint_from(found):
-                found.append(box)
-    return found, lost
-
-
 def as_box(box: Sequence[Any] | None, real: bool, turned: int) -> PoseBox | None:
     """A box with its radii made a little larger; None where there is none, or a complex one may hold a real pose."""
     if box is None:

@@ -14,7 +14,6 @@ from ...geometry.vectors import Array, freeze_array
 from ...results import Value
 from ...tolerances import (
     LOCUS_DISTANCE_TOL,
-    NEAR_MODE_DISTANCE_MAX,
     RELATION_ANGLE_TOL,
     SOLUTION_DISTANCE_MAX,
     TIP_ROUNDING,
@@ -127,28 +126,6 @@ class SystemModes(Value):
     def outcome(self) -> str:
         """Return whether all modes are proved to be listed, as text."""
         return "all modes" if self.complete else self.singular_solutions or "found, not proved to be all"
-
-    @classmethod
-    def of_more(cls, modes: Sequence[SystemMode], out: Sequence[SystemMode], proof: str, bound: str) -> SystemModes:
-        """Return the modes of a square part with further conditions, all of whose zeros are known: its real zeros
-        without those that further conditions exclude (``out``)."""
-        fitting = tuple(mode for mode in modes if mode.proved or mode.residual <= LOCUS_DISTANCE_TOL)
-        open_ = len(modes) - len(fitting)
-        told = words(True, False, [mode.residual for mode in fitting if not mode.proved], len(out), open_)
-        near = tuple(
-            replace(mode, near=True)
-            for mode in (*out, *modes)
-            if mode not in fitting and mode.residual <= NEAR_MODE_DISTANCE_MAX
-        )
-        return cls(
-            len(fitting),
-            fitting,
-            not open_,
-            f"{proof}; of these {told}",
-            near,
-            bound="none" if open_ else bound,
-            enclosed=True,
-        )
 
     def __getstate__(self) -> dict[str, Any]:
         return {**super().__getstate__(), "solved": ()}
