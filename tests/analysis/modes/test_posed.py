@@ -18,7 +18,7 @@ from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.geometry import build_mechanism
 from hrsynth.constraints.pattern import list_leg_ends
 from hrsynth.geometry.vectors import compare_poses
-from hrsynth.solving.platform.pose_bound import _Quotient, bound, dimensions
+from hrsynth.solving.platform.pose_bound import _Quotient, bound, compute_dimensions
 from hrsynth.solving.platform.pose_conditions import (
     AtAngle,
     Coplanar,
@@ -215,10 +215,10 @@ def test_ranks_modulo_one_condition_are_those_modulo_all(kinds, monkeypatch):
     for t in (forms.degree - 2, forms.degree):
         assert _Quotient.of(forms, t) is not None
         most = min(2, t // 2 - 1)
-        found = dimensions(forms, t, most)
+        found = compute_dimensions(forms, t, most)
         with monkeypatch.context() as without:
             without.setattr(_Quotient, "of", lambda *asked: None)
-            assert dimensions(forms, t, most) == found
+            assert compute_dimensions(forms, t, most) == found
 
 
 @pytest.mark.slow

@@ -21,7 +21,7 @@ import numpy as np
 
 from ...geometry.ranks import decompose_matrix
 from ...geometry.vectors import Array, hat
-from ...solving.platform.pose_bound import PRIME, QUATERNION_POWERS_MAX, residues
+from ...solving.platform.pose_bound import PRIME, QUATERNION_POWERS_MAX, compute_residues
 from ...tolerances import FORM_PIVOT_MIN_FRACTION
 
 if TYPE_CHECKING:
@@ -130,7 +130,7 @@ def _dimensions(
 
     count = prod(d + 1 for d in t)
     points = np.random.default_rng(0).integers(1, PRIME, size=(2, len(t), count)).astype(object)
-    axes = [residues(each.axis) for each in system.freedoms_]
+    axes = [compute_residues(each.axis) for each in system.freedoms_]
     w = [
         y if each.slides else (y * y + z * z * (a @ a)) % PRIME
         for each, a, y, z in zip(system.freedoms_, axes, *points, strict=True)
@@ -162,24 +162,24 @@ def _move(freedom: Turn, a: Any, y: Any, z: Any, w: Any) -> tuple[Any, Any]:
     if freedom.slides:
         return np.broadcast_to(one, (len(y), 3, 3)), np.multiply.outer(z * inverse % PRIME, a) % PRIME
     along = np.multiply.outer(a, a) % PRIME
-    across = residues(hat(freedom.axis))
+    across = compute_residues(hat(freedom.axis))
     squares, both = y * y - z * z * (a @ a) % PRIME, 2 * y * z
     turn = (squares[:, None, None] * one + (2 * z * z)[:, None, None] * along + both[:, None, None] * across) % PRIME
     turn = turn * inverse[:, None, None] % PRIME
-    o = residues(freedom.point)
+    o = compute_residues(freedom.point)
     return turn, (o - turn @ o) % PRIME
 
 
 def _value(system: CarriedPlatform, told: CarriedCondition, moves: Sequence[tuple[Any, Any]]) -> Any:
     """Return the values of a condition (n,), without joints that leave it unchanged."""
     count = len(moves[0][0])
-    x, d = (np.broadcast_to(residues(v), (count, 3)) for v in (told.condition.b, told.condition.c))
+    x, d = (np.broadcast_to(compute_residues(v), (count, 3)) for v in (told.condition.b, told.condition.c))
     for k in range(told.joints - 1, -1, -1):
         if k not in told.idle:
             turn, shift = moves[k]
             x = (np.sum(turn * x[:, None, :], axis=2) + shift) % PRIME
             d = np.sum(turn * d[:, None, :], axis=2) % PRIME
-    return told.condition.value(x, d, residues) % PRIME
+    return told.condition.value(x, d, compute_residues) % PRIME
 
 
 def _monomials(points: Array, t: Sequence[int]) -> Any:

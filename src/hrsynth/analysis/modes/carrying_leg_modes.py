@@ -20,10 +20,10 @@ from ...solving.platform.pose_boxes import (
     POSE_BOX_BITS_COUNT,
     PoseBox,
     UnitLength,
-    as_box,
-    at_middle,
-    told_far,
-    zeros,
+    describe_far,
+    enclose_all,
+    find_box_at,
+    make_box,
 )
 from ...solving.platform.pose_conditions import PoseCondition
 from ...solving.platform.pose_forms import Poses
@@ -134,7 +134,7 @@ def enclose_zeros(system: CarriedPlatform, proposed: Array) -> list[PoseBox]:
             if each.slides
             else [UnitLength((k, n + k)), _FixedUnknown(2 * n + k, 0)]
         )
-    return zeros(equations, map(system.unknowns, proposed))[0]
+    return enclose_all(equations, map(system.unknowns, proposed))[0]
 
 
 def _far(system: CarriedPlatform, proposed: Array, known: Sequence[PoseBox]) -> list[PoseBox]:
@@ -147,7 +147,7 @@ def _far(system: CarriedPlatform, proposed: Array, known: Sequence[PoseBox]) -> 
     slides, found = np.array([each.slides for each in system.freedoms_]), list[PoseBox]()
     with ctx.workprec(POSE_BOX_BITS_COUNT):
         for q in proposed:
-            if np.abs(q.imag[~slides]).max(initial=0.0) < COMPLEX_ZERO_IMAGINARY_MIN or at_middle(
+            if np.abs(q.imag[~slides]).max(initial=0.0) < COMPLEX_ZERO_IMAGINARY_MIN or find_box_at(
                 known, system.unknowns(q)
             ):
                 continue
@@ -157,7 +157,7 @@ def _far(system: CarriedPlatform, proposed: Array, known: Sequence[PoseBox]) -> 
             if half is None:
                 continue
             squares = [1 + t * t for t in half]
-            box = as_box(
+            box = make_box(
                 [
                     *(t * 0 + 1 if slid else 2 / w - 1 for t, w, slid in zip(half, squares, slides, strict=True)),
                     *(t * 0 if slid else 2 * t / w for t, w, slid in zip(half, squares, slides, strict=True)),
@@ -205,7 +205,7 @@ def _judge(system: CarriedPlatform) -> SystemModes:
         modes = [as_mode(system, box, not besides or box is at_goal[0]) for box in kept]
     proof = (
         f"{size}: at most {most} solutions by {why}, {len(boxes)} enclosed, all distinct, complex ones "
-        f"too{told_far(boxes)}, {len(real)} real"
+        f"too{describe_far(boxes)}, {len(real)} real"
     )
     if not besides:
         return SystemModes(len(boxes), tuple(modes), True, proof, bound=bound, enclosed=True)

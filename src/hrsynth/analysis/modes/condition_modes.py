@@ -18,11 +18,11 @@ from ...geometry.so3 import convert_from_quaternion, convert_rotations_to_vector
 from ...geometry.vectors import Array, build_pose, freeze_array, invert_pose
 from ...kinematics.configuration import ClosedConfiguration
 from ...solving.platform.constrained_platform import System
-from ...solving.platform.overdetermined import words
+from ...solving.platform.overdetermined import describe_fits
 from ...solving.platform.pose_bound import FEW_FORMS_SECONDS, FORMS_SECONDS, LARGEST_FORMS, bound
-from ...solving.platform.pose_boxes import PoseBox, enclose_poses, is_box_excluded, told_far
+from ...solving.platform.pose_boxes import PoseBox, describe_far, enclose_poses, is_box_excluded
 from ...solving.platform.pose_conditions import OnPlane, PoseCondition
-from ...solving.platform.pose_forms import Poses, SquareForms, proposals
+from ...solving.platform.pose_forms import Poses, SquareForms, propose_poses
 from ...solving.platform.solve import SystemMode, SystemModes
 from ...tolerances import LOCUS_DISTANCE_TOL, MOVED_AXIS_LEVER_MAX, POINT_DISTANCE_TOL, RANK_GAP_MIN, RELATION_ANGLE_TOL
 from ..loci.leg_conditions import Branches, OriginAndUnit, leg_conditions, rigid_platform
@@ -217,14 +217,14 @@ def _judge(system: PosedPlatform, forms: SquareForms, own: bool) -> SystemModes:
         else "conditions that are all linear"
     )
     most, why, named = forms.most, product_, "class"
-    proposed = proposals(forms, forms.degree, forms.most, 0)
+    proposed = propose_poses(forms, forms.degree, forms.most, 0)
     boxes, lost = ([], 1) if proposed is None else enclose_poses(forms, slack, proposed, most)
     if len(boxes) < most:
         found = bound(forms)
         if found is not None:
             most, why, named = found[0], f"ranks modulo a prime of 62 bits, in degree {found[1]}", "rank"
             if lost or len(boxes) < most:
-                proposed, lost = proposals(forms, found[1], most, found[2]), 1
+                proposed, lost = propose_poses(forms, found[1], most, found[2]), 1
         if lost:
             boxes = [] if proposed is None else enclose_poses(forms, slack, proposed)[0]
     at_goal = [box for box in boxes if own and box.real and box.has_pose(np.eye(len(box.middle))[0])]
@@ -233,7 +233,7 @@ def _judge(system: PosedPlatform, forms: SquareForms, own: bool) -> SystemModes:
     real = [box for box in boxes if box.real]
     proof = (
         f"at most {most} pose{'s' * (most != 1)} by {why}, {len(boxes)} enclosed, all distinct, "
-        f"complex ones too{told_far(boxes)}, {len(real)} real"
+        f"complex ones too{describe_far(boxes)}, {len(real)} real"
     )
     left = [c for c in system.conditions if c not in forms.planes and c not in forms.others]
     kept = [box for box in real if box is goal or not is_box_excluded(left, forms.poses, box, slack)]
@@ -244,7 +244,7 @@ def _judge(system: PosedPlatform, forms: SquareForms, own: bool) -> SystemModes:
         others = [mode.residual for mode in modes if not mode.proved]
         proof = (
             f"from {len(system.conditions) - len(left)} of {len(system.conditions)} conditions: {proof}; of these "
-            + words(goal is not None, False, others, len(real) - len(kept), open_)
+            + describe_fits(goal is not None, False, others, len(real) - len(kept), open_)
         )
     return SystemModes(
         len(modes) if left else len(boxes),

@@ -25,7 +25,7 @@ from ...options import option
 from ...progress import report
 from ...records import FLAT, OPTIONAL, As, Shown, recorded
 from ...results import Result
-from ...solving.platform.solve import SystemModes, continuum
+from ...solving.platform.solve import SystemModes, make_continuous_family
 from ...tolerances import MEASUREMENT_BOUND, NEAR_POSE_DIFFERENCE_TOL
 from ..analysis_declaration import analysis
 from ..branch.joint_line import follow_line
@@ -376,7 +376,7 @@ def _list_modes(
             kind,
             goal,
             pose,
-            continuum(f"{text}: a continuous family of dimension {free}", free),
+            make_continuous_family(f"{text}: a continuous family of dimension {free}", free),
             (),
             self_motions=() if own is None else (own,),
         )

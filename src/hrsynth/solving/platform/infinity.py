@@ -76,7 +76,7 @@ class FixedForm(NamedTuple):
         return list(self.row)
 
 
-def beyond(part: PoseSystem, balls: Within, far: Array, wanted: int) -> int:
+def count_beyond(part: PoseSystem, balls: Within, far: Array, wanted: int) -> int:
     """Count the solutions at infinity, or beyond ``SOLUTION_DISTANCE_MAX`` for all input in the balls, that are
     enclosed and distinct: near the ends ``far`` (m, 8) of paths, as (e, g). Other coordinates are tried until as many
     as ``wanted`` are."""
@@ -89,7 +89,7 @@ def beyond(part: PoseSystem, balls: Within, far: Array, wanted: int) -> int:
 
 
 def _enclose_infinity(part: PoseSystem, balls: Within, far: Array, mark: Array) -> int:
-    """As :func:`beyond_limits`, with e and g' fixed by mark·e = 1 and mark·g' = 0; ``mark`` (4,) has entries of length
+    """As :func:`count_beyond`, with e and g' fixed by mark·e = 1 and mark·g' = 0; ``mark`` (4,) has entries of length
     one."""
     from flint import acb
 
@@ -98,11 +98,13 @@ def _enclose_infinity(part: PoseSystem, balls: Within, far: Array, mark: Array) 
     assert own is not None
     rows = [np.append(mark @ half, 0.0) for half in (study[:4], study[4:])]
     quadrics = part.equations()
-    rounded = _equations([Quadric(each.A.astype(float)) for each in quadrics], own.A.astype(float), rows)
-    thick = _equations(part.equations(balls), own.A, [np.array([acb(v) for v in row], dtype=object) for row in rows])
+    rounded = _build_equations([Quadric(each.A.astype(float)) for each in quadrics], own.A.astype(float), rows)
+    thick = _build_equations(
+        part.equations(balls), own.A, [np.array([acb(v) for v in row], dtype=object) for row in rows]
+    )
     boxes: list[list[Any]] = []
     known: list[Array] = []
-    for z in _polish(rounded, _starts(np.vstack([far, far.conj()]), mark, study)):
+    for z in _polish(rounded, _place_starts(np.vstack([far, far.conj()]), mark, study)):
         if not np.all(np.isfinite(z)) or any(np.abs(z - other).max() < ENDPOINT_DISTANCE_TOL for other in known):
             continue
         known.append(z)
@@ -117,13 +119,13 @@ def _enclose_infinity(part: PoseSystem, balls: Within, far: Array, mark: Array) 
     return len(boxes)
 
 
-def _equations(quadrics: Sequence[Quadric], own: Any, rows: Sequence[Any]) -> list[Polynomial]:
+def _build_equations(quadrics: Sequence[Quadric], own: Any, rows: Sequence[Any]) -> list[Polynomial]:
     """The nine for quadrics of which the first is e·g, with the factor and the multiple fixed by rows (9,)."""
     first, *rest = (each.A for each in quadrics)
     return [FixedForm(rows[0], 1), FixedForm(rows[1], 0), FarPose(own, first), *map(FarCondition, rest)]
 
 
-def _starts(far: Array, mark: Array, study: Array) -> Array:
+def _place_starts(far: Array, mark: Array, study: Array) -> Array:
     """(e, g', κ) in the chart's coordinates with mark·e = 1 and mark·g' = 0, shape (m, 9), of (e, g)."""
     x = far / (far[:, :4] @ mark)[:, None]
     e, g = x[:, :4], x[:, 4:]

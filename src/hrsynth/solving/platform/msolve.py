@@ -50,7 +50,7 @@ def parametrise(
     Raises ``MissingExtra`` where msolve is not installed, ``ExternalSolverFailure`` where it does not answer in
     time."""
     count = len(quadrics[0].A) - 1
-    program = executable()
+    program = find_executable()
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / "system.ms"
         source.write_text(write_system(quadrics, nonzero), encoding="ascii")
@@ -65,7 +65,7 @@ def parametrise(
             raise ExternalSolverFailure("msolve", str(error)) from error
 
 
-def executable() -> Path:
+def find_executable() -> Path:
     """The program: of the installed package, else on the path. Raises ``MissingExtra``."""
     try:
         files = importlib.metadata.files(PACKAGE) or []
@@ -83,14 +83,14 @@ def executable() -> Path:
 def write_system(quadrics: Sequence[Quadric], nonzero: Quadric | None = None) -> str:
     """The system in msolve's own format."""
     count = len(quadrics[0].A) - 1
-    names, lines = NAMES[:count], [_sum(_terms(each)) for each in quadrics]
+    names, lines = NAMES[:count], [_sum(_list_terms(each)) for each in quadrics]
     if nonzero is not None:
         names = INVERSE + names
-        lines.append(_sum({f"*{INVERSE}{power}": value for power, value in _terms(nonzero).items()} | {"": -1}))
+        lines.append(_sum({f"*{INVERSE}{power}": value for power, value in _list_terms(nonzero).items()} | {"": -1}))
     return f"{','.join(names)}\n0\n" + ",\n".join(lines) + "\n"
 
 
-def _terms(quadric: Quadric) -> dict[str, int]:
+def _list_terms(quadric: Quadric) -> dict[str, int]:
     """The coefficients of a quadric, without their common divisor, by what they are multiplied with."""
     A = quadric.A
     powers = ["", *(f"*{name}" for name in NAMES[: len(A) - 1])]

@@ -23,7 +23,7 @@ import numpy as np
 
 from ...geometry.vectors import Array
 from .pose_conditions import PoseCondition
-from .pose_forms import ROTATION, SquareForms, exponents
+from .pose_forms import ROTATION, SquareForms, list_exponents
 
 LARGEST_FORMS, FORMS_SECONDS, FEW_FORMS_SECONDS = 1100, 46.0, 0.1
 """Largest number of forms of a degree in linear algebra, and estimated time (s) for that many, and for few."""
@@ -33,7 +33,7 @@ QUATERNION_POWERS_MAX = 4
 PRIME = (1 << 62) - 57
 
 
-def residues(values: Array) -> Any:
+def compute_residues(values: Array) -> Any:
     """Floats as residues, exactly."""
     ratios = [float(v).as_integer_ratio() for v in np.ravel(values)]
     flat = np.array([n * pow(d, -1, PRIME) % PRIME for n, d in ratios], dtype=object)
@@ -41,12 +41,12 @@ def residues(values: Array) -> Any:
 
 
 @lru_cache(maxsize=64)
-def _random(shape: tuple[int, int], count: int) -> Any:
+def _sample_residues(shape: tuple[int, int], count: int) -> Any:
     """Random residues y and s; shape (count, a + m)."""
     return np.random.default_rng(0).integers(1, PRIME, size=(count, sum(shape))).astype(object)
 
 
-def _monomials(x: Any, exponents: Array) -> Any:
+def _evaluate_monomials(x: Any, exponents: Array) -> Any:
     """Monomials at points x (points, unknowns); shape (forms, points)."""
     powers = [x.T * 0 + 1]
     for _ in range(int(exponents.max(initial=0))):
@@ -61,33 +61,39 @@ def _monomials(x: Any, exponents: Array) -> Any:
 
 
 @lru_cache(maxsize=32)
-def _values(shape: tuple[int, int], t: int, at: int) -> Any:
+def _sample_monomials(shape: tuple[int, int], t: int, at: int) -> Any:
     """The monomials of degree t at the random points for degree ``at``; shape (forms, points)."""
-    return _monomials(_random(shape, len(exponents(shape, at))), exponents(shape, t))
+    return _evaluate_monomials(_sample_residues(shape, len(list_exponents(shape, at))), list_exponents(shape, t))
 
 
-def _conditions(forms: SquareForms, x: Any, others: Sequence[PoseCondition]) -> tuple[Any, list[Any]]:
+def _evaluate_conditions(forms: SquareForms, x: Any, others: Sequence[PoseCondition]) -> tuple[Any, list[Any]]:
     """w and conditions, as forms, at points x; shape (points,) each."""
     y, s = x[:, : forms.shape[0]], x[:, forms.shape[0] :]
-    q = y @ residues(forms.poses.turns).T % PRIME
+    q = y @ compute_residues(forms.poses.turns).T % PRIME
     w = np.sum(q * q, axis=1) % PRIME
     inverse = np.array([pow(int(v), -1, PRIME) for v in w], dtype=object)
     R = np.einsum("ikab,na,nb->nik", ROTATION.astype(int).astype(object), q, q) * inverse[:, None, None] % PRIME
     s = s * inverse[:, None] % PRIME
-    heights = [(residues(np.array(c.h)) - (R @ residues(c.b)) @ residues(c.n)) % PRIME for c in forms.planes]
-    matrix = nmod(residues(forms.system)).inv()
+    heights = [
+        (compute_residues(np.array(c.h)) - (R @ compute_residues(c.b)) @ compute_residues(c.n)) % PRIME
+        for c in forms.planes
+    ]
+    matrix = build_nmod(compute_residues(forms.system)).inv()
     solved = np.array([[int(v) for v in row] for row in matrix.table()], dtype=object)
-    p = np.column_stack([*heights, *s.T]) @ solved.T @ residues(forms.poses.moves).T % PRIME
+    p = np.column_stack([*heights, *s.T]) @ solved.T @ compute_residues(forms.poses.moves).T % PRIME
     found = []
     for c in others:
-        value = c.value((p + R @ residues(c.b)) % PRIME, R @ residues(c.c) % PRIME, residues) % PRIME
+        value = (
+            c.value((p + R @ compute_residues(c.b)) % PRIME, R @ compute_residues(c.c) % PRIME, compute_residues)
+            % PRIME
+        )
         for _ in range(c.degree):
             value = value * w % PRIME
         found.append(value)
     return w, found
 
 
-def nmod(rows: Any) -> Any:
+def build_nmod(rows: Any) -> Any:
     """A matrix of residues."""
     from flint import nmod_mat
 
@@ -112,37 +118,37 @@ class _Quotient:
             return None
         for place in (*range(a, a + m), *range(a)):
             power = 1 if place >= a else 2
-            kept = exponents(forms.shape, t)
+            kept = list_exponents(forms.shape, t)
             kept = kept[kept[:, place] < power]
-            x, found = _random(forms.shape, len(kept) if power == 1 else 3 * len(kept) + 20), list[Any]()
-            c, b, d = _parabola(forms, x, place, one)
+            x, found = _sample_residues(forms.shape, len(kept) if power == 1 else 3 * len(kept) + 20), list[Any]()
+            c, b, d = _fit_parabola(forms, x, place, one)
             if not c[0] if power == 2 else not b[0]:
                 continue
             for row, *of in zip(x, c, b, d, strict=True):
-                if (root := _root(*map(int, of))) is not None:
+                if (root := _find_root(*map(int, of))) is not None:
                     found.append([*row[:place], root, *row[place + 1 :]])
             points = np.array(found[: len(kept)], dtype=object).reshape(-1, a + m)
-            told = len(points) == len(kept) and nmod(_monomials(points, kept)).rank() == len(kept)
+            told = len(points) == len(kept) and build_nmod(_evaluate_monomials(points, kept)).rank() == len(kept)
             return cls(place, power, points) if told else None
         return None
 
     def values(self, forms: SquareForms, t: int) -> Any:
         """The forms of a degree that are left, at the points."""
-        every = exponents(forms.shape, t)
-        return _monomials(self.points, every[every[:, self.place] < self.power])
+        every = list_exponents(forms.shape, t)
+        return _evaluate_monomials(self.points, every[every[:, self.place] < self.power])
 
 
-def _parabola(forms: SquareForms, x: Any, place: int, one: PoseCondition) -> tuple[Any, Any, Any]:
+def _fit_parabola(forms: SquareForms, x: Any, place: int, one: PoseCondition) -> tuple[Any, Any, Any]:
     """c, b, d of a condition c v² + b v + d of degree 2 in an unknown v, the others as they are at points."""
     d, plus, minus = (
-        _conditions(forms, np.hstack([x[:, :place], x[:, :1] * 0 + v, x[:, place + 1 :]]), [one])[1][0]
+        _evaluate_conditions(forms, np.hstack([x[:, :place], x[:, :1] * 0 + v, x[:, place + 1 :]]), [one])[1][0]
         for v in (0, 1, PRIME - 1)
     )
     half = (PRIME + 1) // 2
     return ((plus + minus) * half - d) % PRIME, (plus - minus) * half % PRIME, d
 
 
-def _root(c: int, b: int, d: int) -> int | None:
+def _find_root(c: int, b: int, d: int) -> int | None:
     """A root of c v² + b v + d, where there is one; the prime is 3 modulo 4."""
     if not c:
         return -d * pow(b, -1, PRIME) % PRIME if b else None
@@ -151,34 +157,34 @@ def _root(c: int, b: int, d: int) -> int | None:
     return (root - b) * pow(2 * c, -1, PRIME) % PRIME if root * root % PRIME == square else None
 
 
-def dimensions(forms: SquareForms, t: int, most: int) -> list[int]:
+def compute_dimensions(forms: SquareForms, t: int, most: int) -> list[int]:
     """dim (wᵏ S + I_t) - dim I_t for k = 1 … ``most``, modulo the prime."""
     quotient = _Quotient.of(forms, t)
-    points, others = _random(forms.shape, len(exponents(forms.shape, t))), forms.others
+    points, others = _sample_residues(forms.shape, len(list_exponents(forms.shape, t))), forms.others
     if quotient is not None:
         points, others = quotient.points, others[1:]
 
     def values(degree: int) -> Any:
-        return _values(forms.shape, degree, t) if quotient is None else quotient.values(forms, degree)
+        return _sample_monomials(forms.shape, degree, t) if quotient is None else quotient.values(forms, degree)
 
-    w, found = _conditions(forms, points, others)
+    w, found = _evaluate_conditions(forms, points, others)
     rows = [values(t - 2 * c.degree) * value % PRIME for c, value in zip(others, found, strict=True)]
     # what vanishes on I_t, on which wᵏ S has the rank that it has modulo I_t
-    kernel, size = nmod(np.vstack(rows)).nullspace()
+    kernel, size = build_nmod(np.vstack(rows)).nullspace()
     columns = np.array([[int(v) for v in row[:size]] for row in kernel.table()], dtype=object)
     ranks = []
     for k in range(1, most + 1):
         columns = columns * w[:, None] % PRIME
-        ranks.append((nmod(values(t - 2 * k)) * nmod(columns)).rank())
+        ranks.append((build_nmod(values(t - 2 * k)) * build_nmod(columns)).rank())
     return ranks
 
 
 def bound(forms: SquareForms) -> tuple[int, int, int] | None:
     """D, the degree t and k; None where there are infinitely many, or the forms would be too many."""
     t = forms.degree
-    while forms.others and len(exponents(forms.shape, t)) <= LARGEST_FORMS:
+    while forms.others and len(list_exponents(forms.shape, t)) <= LARGEST_FORMS:
         most = min(QUATERNION_POWERS_MAX, t // 2 - 1)
-        found = dimensions(forms, t, most)
+        found = compute_dimensions(forms, t, most)
         for k, (one, next_) in enumerate(pairwise(found), 1):
             if one == next_:
                 return one, t, k

@@ -194,14 +194,14 @@ def enclose_poses(
             if lost and len(found) + len(proposed[0]) - number < needed:
                 break
             real = bool(np.abs(x.imag).max() < NEARLY_REAL_POSE_TOL)
-            model = None if real else at_middle([box for box in found if not box.real], x.conj())
+            model = None if real else find_box_at([box for box in found if not box.real], x.conj())
             if model is not None:
                 each: PoseBox | None = replace(model, middle=model.middle.conj())
             elif np.all(np.isfinite(x)):
                 start = [arb(v) for v in x.real.tolist()] if real else [acb(v.real, v.imag) for v in x.tolist()]
-                each = as_box(enclose_zero(equations, start), real, turned)
+                each = make_box(enclose_zero(equations, start), real, turned)
                 if each is None and turned == 4 and np.abs(x.imag).max() > COMPLEX_ZERO_IMAGINARY_MIN:
-                    each = as_box(enclose_zero(exact, start), False, turned)
+                    each = make_box(enclose_zero(exact, start), False, turned)
                     each = None if each is None else replace(each, rounded=True)
             else:
                 each = None
@@ -212,7 +212,7 @@ def enclose_poses(
     return found, lost
 
 
-def at_middle(boxes: Sequence[PoseBox], x: Array) -> PoseBox | None:
+def find_box_at(boxes: Sequence[PoseBox], x: Array) -> PoseBox | None:
     """The first box of which a pose is the middle to rounding."""
     if not boxes:
         return None
@@ -223,13 +223,13 @@ def at_middle(boxes: Sequence[PoseBox], x: Array) -> PoseBox | None:
     return boxes[found[0]] if len(found) else None
 
 
-def told_far(boxes: Iterable[PoseBox]) -> str:
+def describe_far(boxes: Iterable[PoseBox]) -> str:
     """Return the number proved for the rounded geometry alone, as text."""
     far = sum(box.rounded for box in boxes)
     return f", {far} far from real ones for the rounded geometry" if far else ""
 
 
-def zeros(equations: Sequence[Polynomial], proposed: Iterable[Array]) -> tuple[list[PoseBox], int]:
+def enclose_all(equations: Sequence[Polynomial], proposed: Iterable[Array]) -> tuple[list[PoseBox], int]:
     """Boxes of common zeros near those that are proposed (n,), apart from each other, and how many have none."""
     from flint import acb, arb, ctx
 
@@ -238,7 +238,7 @@ def zeros(equations: Sequence[Polynomial], proposed: Iterable[Array]) -> tuple[l
         for x in proposed:
             real = bool(np.abs(x.imag).max(initial=0.0) < NEARLY_REAL_POSE_TOL * (1.0 + np.abs(x).max(initial=0.0)))
             start = [arb(v) for v in x.real.tolist()] if real else [acb(v.real, v.imag) for v in x.tolist()]
-            box = as_box(enclose_zero(equations, start), real, 0)
+            box = make_box(enclose_zero(equations, start), real, 0)
             if box is None:
                 lost += 1
             elif box.is_disjoint_from(found):
@@ -246,7 +246,7 @@ def zeros(equations: Sequence[Polynomial], proposed: Iterable[Array]) -> tuple[l
     return found, lost
 
 
-def as_box(box: Sequence[Any] | None, real: bool, turned: int) -> PoseBox | None:
+def make_box(box: Sequence[Any] | None, real: bool, turned: int) -> PoseBox | None:
     """A box with its radii made a little larger; None where there is none, or a complex one may hold a real pose."""
     if box is None:
         return None

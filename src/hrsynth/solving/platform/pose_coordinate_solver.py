@@ -20,8 +20,8 @@ from ...geometry.vectors import Array
 from ...tolerances import BOX_SEPARATION_TOL, SOLUTION_DISTANCE_MAX
 from ..krawczyk import enclose_zero
 from .constrained_platform import System
-from .homotopy import ends
-from .infinity import beyond
+from .homotopy import find_endpoints
+from .infinity import count_beyond
 from .modular_root_bound import combine_quadrics
 from .msolve import Parametrisation, parametrise
 from .polynomials import Quadric
@@ -33,7 +33,7 @@ from .roots import (
     Solution,
     SolutionEncloser,
     SolutionSet,
-    all_solutions,
+    find_all_solutions,
     is_real,
     is_sharp,
 )
@@ -56,7 +56,7 @@ class ProposedSolutions:
     far: Array | None = None
 
 
-def wholes(system: System, number: int = 0) -> Iterator[PoseSystem]:
+def list_pose_systems(system: System, number: int = 0) -> Iterator[PoseSystem]:
     """Yield the choices of legs with just as many equations as dof, then those with too many."""
     chart = system.chart(number)
     for size in range(1, len(system.curves) + 1):
@@ -74,15 +74,15 @@ def propose_roots(part: PoseSystem, enough: int | None) -> ProposedSolutions | N
     """All solutions, up to rounding, ``enough`` at most; None where there seem to be infinitely many.
 
     Raises ``MissingExtra``, ``ExternalSolverFailure`` where msolve is needed."""
-    return by_msolve(part) if part.chart.study is None else by_homotopy(part, enough)
+    return propose_by_msolve(part) if part.chart.study is None else propose_by_homotopy(part, enough)
 
 
-def by_homotopy(part: PoseSystem, enough: int | None) -> ProposedSolutions:
+def propose_by_homotopy(part: PoseSystem, enough: int | None) -> ProposedSolutions:
     """All poses of a rigid body, up to rounding, ``enough`` at most."""
     from flint import acb
 
     assert part.chart.study is not None
-    found = ends(part.equations(), part.chart.study, _resting(part), enough)
+    found = find_endpoints(part.equations(), part.chart.study, _find_fixed_tip(part), enough)
     values = [[acb(v.real, v.imag) for v in row] for row in found.solutions.tolist()]
     return ProposedSolutions(
         tuple(zip(values, found.multiple, strict=True)),
@@ -94,7 +94,7 @@ def by_homotopy(part: PoseSystem, enough: int | None) -> ProposedSolutions:
     )
 
 
-def _resting(part: PoseSystem) -> tuple[int, ...]:
+def _find_fixed_tip(part: PoseSystem) -> tuple[int, ...]:
     """Return the indices of the three equations of a fixed tip; none if there is none."""
     counts = [3 - part.chart.reaches[k].freedoms for k in part.legs]
     first = next((k for k, leg in enumerate(part.legs) if isinstance(part.chart.reaches[leg], Point)), None)
@@ -104,7 +104,7 @@ def _resting(part: PoseSystem) -> tuple[int, ...]:
     return tuple(range(before, before + 3))
 
 
-def by_msolve(part: PoseSystem) -> ProposedSolutions | None:
+def propose_by_msolve(part: PoseSystem) -> ProposedSolutions | None:
     """All solutions, distinct ones once; None where they are infinitely many.
 
     Raises ``MissingExtra``, ``ExternalSolverFailure``."""
@@ -114,7 +114,7 @@ def by_msolve(part: PoseSystem) -> ProposedSolutions | None:
         answer, nonzero = parametrise(equations, nonzero), None
     if answer is None:
         return None
-    solutions = all_solutions(answer.polynomial, lambda t, m: _over(answer, nonzero, t, m))
+    solutions = find_all_solutions(answer.polynomial, lambda t, m: _solve_over(answer, nonzero, t, m))
     poses = tuple(each for each in solutions if not _is_extraneous(nonzero, each[0]))
     lost = answer.polynomial.degree() - len(solutions)
     return ProposedSolutions(poses, "msolve's parametrisation", len(solutions) - len(poses), lost)
@@ -149,7 +149,7 @@ def enclose_roots(
         wanted = most.most - found.complex if most is not None and most.law == "degree" and apart else 0
         away = 0
         if wanted > 0 and proposed.far is not None and np.isfinite(farthest):
-            away = beyond(part, balls, proposed.far, wanted)
+            away = count_beyond(part, balls, proposed.far, wanted)
     return replace(found, extraneous=proposed.extraneous, apart=apart, beyond=away, method=proposed.method)
 
 
@@ -249,7 +249,7 @@ def _is_pose(chart: PoseParametrization, box: Sequence[Any]) -> bool:
     return sum(float(abs(e).upper()) ** 2 for e in chart.study[:4].astype(int) @ ends) < SOLUTION_DISTANCE_MAX * least
 
 
-def _over(answer: Parametrisation, nonzero: Quadric | None, t: Any, multiplicity: int) -> list[Solution]:
+def _solve_over(answer: Parametrisation, nonzero: Quadric | None, t: Any, multiplicity: int) -> list[Solution]:
     """Return the solution over a root; none if it is not finite or not known to be a pose."""
     values = answer.others(t)
     if not all(is_sharp(v) for v in values):

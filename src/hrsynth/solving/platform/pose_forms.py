@@ -36,7 +36,7 @@ POINTS_PER_FORM_FRACTION = 1.15
 """Points for each form."""
 
 
-def _tensor() -> Array:
+def _make_tensor() -> Array:
     """T with R_ik = Σ T[i, k, a, b] q_a q_b for a unit quaternion; symmetric in a and b; shape (3, 3, 4, 4)."""
     T = np.zeros((3, 3, 4, 4))
     for i in range(3):
@@ -48,7 +48,7 @@ def _tensor() -> Array:
     return T
 
 
-ROTATION = _tensor()
+ROTATION = _make_tensor()
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +158,7 @@ class SquareForms:
     @property
     def size(self) -> int:
         """Number of forms of that degree."""
-        return len(exponents(self.shape, self.degree))
+        return len(list_exponents(self.shape, self.degree))
 
     @cached_property
     def system(self) -> Array:
@@ -176,7 +176,7 @@ class SquareForms:
 
 
 @lru_cache(maxsize=64)
-def exponents(shape: tuple[int, int], t: int) -> Array:
+def list_exponents(shape: tuple[int, int], t: int) -> Array:
     """The exponents of q and s in the monomials of a degree; shape (n, a + m)."""
     a, m = shape
     found = [
@@ -190,7 +190,7 @@ def exponents(shape: tuple[int, int], t: int) -> Array:
 
 
 @lru_cache(maxsize=16)
-def _points(shape: tuple[int, int], count: int) -> tuple[Array, Array]:
+def _sample_points(shape: tuple[int, int], count: int) -> tuple[Array, Array]:
     """Random unit vectors (n, a) and free coordinates (n, m)."""
     rng = np.random.default_rng(0)
     y = rng.normal(size=(count, shape[0]))
@@ -200,35 +200,35 @@ def _points(shape: tuple[int, int], count: int) -> tuple[Array, Array]:
 
 
 @lru_cache(maxsize=64)
-def _basis(shape: tuple[int, int], t: int, count: int) -> Array:
+def _build_basis(shape: tuple[int, int], t: int, count: int) -> Array:
     """Orthonormal values (points, forms) of the forms of a degree."""
-    x = np.hstack(_points(shape, count))
-    values = np.prod(x[:, None, :] ** exponents(shape, t)[None], axis=2)
+    x = np.hstack(_sample_points(shape, count))
+    values = np.prod(x[:, None, :] ** list_exponents(shape, t)[None], axis=2)
     return np.asarray(np.linalg.qr(values / np.linalg.norm(values, axis=0))[0])
 
 
 @lru_cache(maxsize=64)
-def _times(shape: tuple[int, int], t: int, count: int, what: str) -> Array:
+def _build_products(shape: tuple[int, int], t: int, count: int, what: str) -> Array:
     """Multiplication of lower forms by each of what is named: y, s, or w = 1 on the points; (n, lower forms, forms)."""
-    y, s = _points(shape, count)
+    y, s = _sample_points(shape, count)
     by = {"y": y.T, "s": s.T, "w": np.ones((1, count))}[what]
-    high, low = _basis(shape, t, count), _basis(shape, t - (1 if what == "y" else 2), count)
+    high, low = _build_basis(shape, t, count), _build_basis(shape, t - (1 if what == "y" else 2), count)
     return np.array([(low * each[:, None]).T @ high for each in by]).reshape(-1, low.shape[1], high.shape[1])
 
 
-def proposals(forms: SquareForms, t: int, number: int, k: int) -> tuple[Array, Array] | None:
+def propose_poses(forms: SquareForms, t: int, number: int, k: int) -> tuple[Array, Array] | None:
     """Return all poses to rounding, from the forms of degree t, ``number`` of them on the multiples of wᵏ: coordinates
     y (n, a), of unit quaternions, complex, and positions (n, 3); None if they are not separated, or if there are more
     functionals than isolated zeros could span: some zeros are not isolated, and then these are fewer."""
     from scipy.linalg import lstsq, qr
 
     shape = forms.shape
-    size = len(exponents(shape, t))
+    size = len(list_exponents(shape, t))
     count = int(POINTS_PER_FORM_FRACTION * size) + 10
-    y, s = _points(shape, count)
-    high, R = _basis(shape, t, count), forms.poses.rotations(y)
+    y, s = _sample_points(shape, count)
+    high, R = _build_basis(shape, t, count), forms.poses.rotations(y)
     rows = [
-        (_basis(shape, t - degree, count) * (values / np.abs(values).max())[:, None]).T @ high
+        (_build_basis(shape, t - degree, count) * (values / np.abs(values).max())[:, None]).T @ high
         for values, degree in zip(forms.values(R, forms.position(R, s)), forms.degrees, strict=True)
     ]
     space = np.eye(size)
@@ -237,14 +237,14 @@ def proposals(forms: SquareForms, t: int, number: int, k: int) -> tuple[Array, A
         pivots = np.abs(np.diag(upper))
         space = Q[:, int(np.sum(pivots > FORM_PIVOT_MIN_FRACTION * pivots[0])) :]
     for step in range(k):
-        space = _times(shape, t - 2 * step, count, "w")[0] @ space
+        space = _build_products(shape, t - 2 * step, count, "w")[0] @ space
     if space.shape[1] < number or (not k and space.shape[1] > number):
         return None
     if k:
         space = decompose_matrix(space)[0][:, :number]
     t -= 2 * k
-    by_w, by_s = (_times(shape, t, count, what) @ space for what in "ws")
-    shifted = _times(shape, t, count, "y") @ space if shape[0] > 1 else np.concatenate([by_w, by_s])
+    by_w, by_s = (_build_products(shape, t, count, what) @ space for what in "ws")
+    shifted = _build_products(shape, t, count, "y") @ space if shape[0] > 1 else np.concatenate([by_w, by_s])
     one, other = np.einsum("cj,jnd->cnd", np.random.default_rng(1).normal(size=(2, len(shifted))), shifted)
     _, X = np.linalg.eig(lstsq(one, other)[0])
     if shape[0] > 1:

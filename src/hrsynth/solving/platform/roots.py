@@ -19,8 +19,17 @@ import numpy as np
 from ...geometry.loci import Circle, Curve
 from ...tolerances import RANK_GAP_MIN, SOLUTION_DISTANCE_MAX
 from ..krawczyk import Polynomial, enclose_zero
-from .polynomials import Eliminant, Equation, cycle, height, pair, primitive, univariate, without
-from .quadrics import UNIT, Balls, Conic, Within, WorkingFrame, parameter
+from .polynomials import (
+    Eliminant,
+    Equation,
+    compute_height,
+    divide_out,
+    eliminate_cycle,
+    make_primitive,
+    make_univariate,
+    pair,
+)
+from .quadrics import UNIT, Balls, Conic, Within, WorkingFrame, convert_parameter
 from .square_systems import SquareSystem
 
 if TYPE_CHECKING:
@@ -113,13 +122,15 @@ def solve_square(square: SquareSystem, balls: Within = Balls, farthest: float = 
         with ctx.workprec(ROOT_ISOLATION_BITS_COUNT):
             conics = square.conics(turn, balls)
             thick = square.build(conics, balls)
-        noisy = _perturb(equations, thick)
+        noisy = _change_coefficients(equations, thick)
         zeros = 0
-        for (order, eliminant), (_, other) in zip(_eliminants(equations), _eliminants(noisy), strict=True):
+        for (order, eliminant), (_, other) in zip(_list_eliminants(equations), _list_eliminants(noisy), strict=True):
             if _is_zero_to_rounding(eliminant.polynomial, other.polynomial):
                 zeros += 1
                 continue
-            found = _roots(_SquareEncloser(balls, equations, thick, square, turn, conics), order, eliminant, farthest)
+            found = _solve_eliminant(
+                _SquareEncloser(balls, equations, thick, square, turn, conics), order, eliminant, farthest
+            )
             if found.complete:
                 return replace(found, turn=turn)
             fallback = max(fallback, found, key=lambda each: each.complex)
@@ -128,23 +139,23 @@ def solve_square(square: SquareSystem, balls: Within = Balls, farthest: float = 
     return fallback
 
 
-def _eliminants(equations: Sequence[Equation]) -> Iterator[tuple[tuple[int, ...], Eliminant]]:
+def _list_eliminants(equations: Sequence[Equation]) -> Iterator[tuple[tuple[int, ...], Eliminant]]:
     """The eliminants with each unknown kept in turn; the order of the unknowns, the kept one first."""
     tables = [equation.table for equation in equations]
     if len(tables) == 1:
-        yield (0,), univariate(tables[0][:, 0])
+        yield (0,), make_univariate(tables[0][:, 0])
     elif len(tables) == 2:
         f, g = tables
         yield (0, 1), pair(f, g)
         yield (1, 0), pair(f.T, g.T)
     else:
         f, g, h = tables
-        yield (0, 1, 2), cycle(f, g, h)
-        yield (1, 2, 0), cycle(g, h, f)
-        yield (2, 0, 1), cycle(h, f, g)
+        yield (0, 1, 2), eliminate_cycle(f, g, h)
+        yield (1, 2, 0), eliminate_cycle(g, h, f)
+        yield (2, 0, 1), eliminate_cycle(h, f, g)
 
 
-def _perturb(equations: Sequence[Equation], thick: Sequence[Equation]) -> list[Equation]:
+def _change_coefficients(equations: Sequence[Equation], thick: Sequence[Equation]) -> list[Equation]:
     """The equations with each coefficient changed at random by what the rounding of the input allows."""
     rng = random.Random(0)
     found = []
@@ -162,22 +173,24 @@ def _spread(ball: Any) -> float:
 
 def _is_zero_to_rounding(polynomial: fmpz_poly, noisy: fmpz_poly) -> bool:
     """Return True if a resultant is zero, or of the size that rounding gives zero."""
-    return not polynomial or height(polynomial - noisy) * LOUD > height(polynomial)
+    return not polynomial or compute_height(polynomial - noisy) * LOUD > compute_height(polynomial)
 
 
-def _roots(square: _SquareEncloser, order: tuple[int, ...], eliminant: Eliminant, farthest: float) -> SolutionSet:
+def _solve_eliminant(
+    square: _SquareEncloser, order: tuple[int, ...], eliminant: Eliminant, farthest: float
+) -> SolutionSet:
     """The solutions over the roots of an eliminant."""
     from flint import ctx, fmpz_poly
 
     half_angles = square.part.round
     kept_round = half_angles[order[0]]
-    polynomial, extraneous = primitive(eliminant.polynomial), 0
+    polynomial, extraneous = make_primitive(eliminant.polynomial), 0
     at_infinity = kept_round and polynomial.degree() < eliminant.bound
     if kept_round:
-        polynomial, pairs = without(polynomial, fmpz_poly([1, 0, 1]))
+        polynomial, pairs = divide_out(polynomial, fmpz_poly([1, 0, 1]))
         extraneous = 2 * pairs
     found = square.all_of(
-        all_solutions(polynomial, lambda x, m: _over(x, m, order, eliminant, half_angles)),
+        find_all_solutions(polynomial, lambda x, m: _solve_over(x, m, order, eliminant, half_angles)),
         polynomial.degree(),
         farthest,
     )
@@ -185,12 +198,12 @@ def _roots(square: _SquareEncloser, order: tuple[int, ...], eliminant: Eliminant
         surely = all(
             square.is_proved_complex(values)
             for values in found.values
-            if DOUBLE_SOLUTION_DISTANCE_TOL / 2 <= off_real(values) < NEARLY_REAL_ROOT_TOL
+            if DOUBLE_SOLUTION_DISTANCE_TOL / 2 <= compute_off_real(values) < NEARLY_REAL_ROOT_TOL
         )
     return replace(found, extraneous=extraneous, complete=found.complete and not at_infinity and surely)
 
 
-def all_solutions(polynomial: fmpz_poly, over: Callable[[Any, int], list[Solution]]) -> list[Solution]:
+def find_all_solutions(polynomial: fmpz_poly, over: Callable[[Any, int], list[Solution]]) -> list[Solution]:
     """The solutions ``over`` each complex root and its multiplicity, as precise as it takes to have them all."""
     from flint import ctx
 
@@ -198,14 +211,14 @@ def all_solutions(polynomial: fmpz_poly, over: Callable[[Any, int], list[Solutio
     precision = ROOT_ISOLATION_BITS_COUNT
     for _ in range(PRECISION_DOUBLINGS_MAX):
         with ctx.workprec(precision):
-            resolved = [each for x, m in _isolate(polynomial) for each in over(x, m)]
+            resolved = [each for x, m in _find_roots(polynomial) for each in over(x, m)]
             if sum(m for _, m in resolved) == polynomial.degree():
                 break
         precision *= 2
     return resolved
 
 
-def _over(
+def _solve_over(
     x: Any, multiplicity: int, order: tuple[int, ...], eliminant: Eliminant, half_angles: Sequence[bool]
 ) -> list[Solution]:
     """Return the solutions over a root, each with its multiplicity; none if they cannot be separated from infinity or
@@ -219,7 +232,7 @@ def _over(
     return [(values, 1) for values in found]
 
 
-def _isolate(polynomial: fmpz_poly) -> list[tuple[Any, int]]:
+def _find_roots(polynomial: fmpz_poly) -> list[tuple[Any, int]]:
     """Balls about the roots of an integer polynomial, each with one root alone, and multiplicities."""
     roots: Any = polynomial.complex_roots() if polynomial.degree() > 0 else []
     return [(x, int(m)) for x, m in roots]
@@ -252,7 +265,7 @@ def is_real(values: Sequence[Any]) -> bool:
     return all(v.imag.is_zero() for v in values)
 
 
-def off_real(values: Sequence[Any]) -> float:
+def compute_off_real(values: Sequence[Any]) -> float:
     """Return the distance of a solution from real ones, relative to its unknowns."""
     return max(abs(float(v.imag)) / (1.0 + abs(float(v.real))) for v in values)
 
@@ -260,7 +273,7 @@ def off_real(values: Sequence[Any]) -> float:
 def _is_almost_real(values: Sequence[Any]) -> bool:
     """Return True if a solution is the first of a conjugate pair that nearly is one real solution."""
     first = next((float(v.imag) for v in values if not v.imag.is_zero()), 0.0)
-    return off_real(values) < DOUBLE_SOLUTION_DISTANCE_TOL / 2 and first > 0
+    return compute_off_real(values) < DOUBLE_SOLUTION_DISTANCE_TOL / 2 and first > 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -290,7 +303,7 @@ class SolutionEncloser(ABC):
         root of ``degree`` has its solution and each real one is enclosed or multiple."""
         from flint import ctx
 
-        resolved, far, undecided = _nearer(solutions, self.distance, farthest)
+        resolved, far, undecided = _select_nearer(solutions, self.distance, farthest)
         with ctx.workprec(ROOT_ISOLATION_BITS_COUNT):
             real = tuple(self._enclose([v.real for v in values], m) for values, m in resolved if is_real(values))
             real += tuple(self._middle(values) for values, _ in resolved if _is_almost_real(values))
@@ -303,7 +316,7 @@ class SolutionEncloser(ABC):
             real,
             degree - far,
             complete=count == degree - far and proved and not undecided,
-            closest=_closest(values),
+            closest=_measure_closest(values),
             method=self.method,
             far=far,
             undecided=undecided,
@@ -370,7 +383,7 @@ class _SquareEncloser(SolutionEncloser):
 
     def parameters(self, values: Sequence[Any]) -> tuple[Any, ...]:
         return tuple(
-            parameter(curve, self.frame, origin, t)
+            convert_parameter(curve, self.frame, origin, t)
             for curve, origin, t in zip(self.part.unknowns, self.part.turns(self.turn), values, strict=True)
         )
 
@@ -396,7 +409,7 @@ class _SquareEncloser(SolutionEncloser):
         )
 
 
-def _nearer(
+def _select_nearer(
     solutions: Sequence[Solution], distance: Callable[[Sequence[Any]], float], farthest: float
 ) -> tuple[list[Solution], int, bool]:
     """The solutions within a distance (sizes), which are not at infinity but for rounding, how many are beyond, and
@@ -412,7 +425,7 @@ def _nearer(
     return [each for _, each in near], sum(m for _, m in beyond), False
 
 
-def _closest(solutions: Sequence[Sequence[Any]]) -> float:
+def _measure_closest(solutions: Sequence[Sequence[Any]]) -> float:
     """The smallest distance between two solutions, each unknown relative to its size."""
     values = np.array([[complex(v) for v in each] for each in solutions])
     if len(values) < 2:

@@ -20,21 +20,27 @@ from ...tolerances import (
     TIP_ROUNDING,
 )
 from .constrained_platform import System
-from .modular_root_bound import most_zeros
+from .modular_root_bound import bound_zeros
 from .overdetermined import (
     SnappedPoints,
-    dimension,
+    compute_residual,
+    describe_fits,
+    find_dimension,
+    find_stationary,
     is_beyond_rigid_platform,
     is_excluded,
     may_be_goal,
-    residual,
     snap_centres,
-    stationary,
-    words,
 )
-from .pose_coordinate_solver import ProposedSolutions, by_msolve, enclose_roots, propose_roots, wholes
+from .pose_coordinate_solver import (
+    ProposedSolutions,
+    enclose_roots,
+    list_pose_systems,
+    propose_by_msolve,
+    propose_roots,
+)
 from .quadrics import PoseSystem
-from .root_bound import Bound, least_bound
+from .root_bound import Bound, find_least_bound
 from .roots import DOUBLE_SOLUTION_DISTANCE_TOL, RealSolution, SolutionSet, has_nearly_double_solution, solve_square
 from .square_systems import SquareSystem
 from .translating import TranslatingPlatform
@@ -129,7 +135,7 @@ class SystemModes(Value):
         without those that further conditions exclude (``out``)."""
         fitting = tuple(mode for mode in modes if mode.proved or mode.residual <= LOCUS_DISTANCE_TOL)
         open_ = len(modes) - len(fitting)
-        told = words(True, False, [mode.residual for mode in fitting if not mode.proved], len(out), open_)
+        told = describe_fits(True, False, [mode.residual for mode in fitting if not mode.proved], len(out), open_)
         near = tuple(
             replace(mode, near=True)
             for mode in (*out, *modes)
@@ -165,7 +171,7 @@ def solve(system: System, *, near: bool = True, goal: Array | None = None) -> Sy
 
 def _solve(system: System, near: bool, goal: Array | None) -> SystemModes:
     if system.missing:
-        return _too_few(system)
+        return _report_too_few(system)
     square = None
     for square in system.squares():
         roots = solve_square(square, system.balls(square.frame), system.farthest)
@@ -182,7 +188,7 @@ def _solve(system: System, near: bool, goal: Array | None) -> SystemModes:
             )
     if system.has_surface_loci and not isinstance(system, TranslatingPlatform):
         return _propose(system, near, goal, propose_roots)
-    return _undecided_modes(system, square is not None, goal, near)
+    return _report_undecided(system, square is not None, goal, near)
 
 
 def solve_by_msolve(system: System, *, near: bool = True, goal: Array | None = None) -> SystemModes:
@@ -192,7 +198,7 @@ def solve_by_msolve(system: System, *, near: bool = True, goal: Array | None = N
     one choice of legs alone. Raises ``MissingExtra``, ``ExternalSolverFailure``.
     """
     system, told = snap_centres(system)
-    return replace(_propose(system, near, goal, lambda part, enough: by_msolve(part)), snapped=told)
+    return replace(_propose(system, near, goal, lambda part, enough: propose_by_msolve(part)), snapped=told)
 
 
 def _propose(
@@ -202,10 +208,10 @@ def _propose(
     proposer: Callable[[PoseSystem, int | None], ProposedSolutions | None],
 ) -> SystemModes:
     if system.missing:
-        return _too_few(system)
+        return _report_too_few(system)
     part = None
-    for part in islice(wholes(system), LEG_CHOICES_SOLVED_MAX):
-        most = least_bound(system, part.legs)
+    for part in islice(list_pose_systems(system), LEG_CHOICES_SOLVED_MAX):
+        most = find_least_bound(system, part.legs)
         roots = None
         for number in range(POSE_CHARTS_TRIED_MAX):
             part = replace(part, chart=system.chart(number)) if number else part
@@ -213,24 +219,24 @@ def _propose(
             if found is None:
                 break
             roots = enclose_roots(part, found, most, system.balls(part.chart.frame), system.farthest)
-            if found.loose and roots.complex != (most and most.most) and dimension(system):
+            if found.loose and roots.complex != (most and most.most) and find_dimension(system):
                 roots = None
                 break
             if roots.apart or not roots.complete or part.chart.study is None:
                 break
         if roots is not None:
             return _judge(system, part, roots, () if near else None, goal, most)
-    return _undecided_modes(system, part is not None, goal, near)
+    return _report_undecided(system, part is not None, goal, near)
 
 
-def _too_few(system: System) -> SystemModes:
-    return continuum(f"too few legs: a continuous family of dimension {system.missing}", system.missing)
+def _report_too_few(system: System) -> SystemModes:
+    return make_continuous_family(f"too few legs: a continuous family of dimension {system.missing}", system.missing)
 
 
-def _undecided_modes(system: System, tried: bool, goal: Array | None, near: bool) -> SystemModes:
+def _report_undecided(system: System, tried: bool, goal: Array | None, near: bool) -> SystemModes:
     """Return the result if no choice of legs has finitely many solutions: the goal, if it is given, is one. Poses of a
     continuous family are sought if ``near`` ones are."""
-    known = () if goal is None else (_by_construction(system, goal, ()),)
+    known = () if goal is None else (_make_goal_mode(system, goal, ()),)
     if not tried:
         return SystemModes(
             len(known),
@@ -249,7 +255,7 @@ def _undecided_modes(system: System, tried: bool, goal: Array | None, near: bool
             singular_solutions="the equations depend on each other",
             open=True,
         )
-    size = dimension(system)
+    size = find_dimension(system)
     if not size:
         return SystemModes(
             len(known),
@@ -259,10 +265,12 @@ def _undecided_modes(system: System, tried: bool, goal: Array | None, near: bool
             singular_solutions="the equations depend on each other, but no continuous family of poses was found",
             open=True,
         )
-    return replace(continuum(f"the tips can move together: a continuous family of dimension {size}", size), open=True)
+    return replace(
+        make_continuous_family(f"the tips can move together: a continuous family of dimension {size}", size), open=True
+    )
 
 
-def continuum(text: str, size: int) -> SystemModes:
+def make_continuous_family(text: str, size: int) -> SystemModes:
     """Return modes that form a continuous family of this dimension."""
     return SystemModes(
         0, (), False, "a continuous family is not counted", singular_solutions=text, continuous_family=size
@@ -279,10 +287,10 @@ def _judge(
 ) -> SystemModes:
     """The modes among the solutions of a square part, ``most`` at most; near ones are looked for from those of others
     too (not at all where these are None)."""
-    found = [_mode(system, square, root) for root in roots.real]
+    found = [_make_mode(system, square, root) for root in roots.real]
     enclosed = roots.complete and all(mode.proved for mode in found)
     bound, proof = (
-        ("resultant", _proof(system, roots))
+        ("resultant", _describe_proof(system, roots))
         if isinstance(square, SquareSystem)
         else _bound(system, square, most, roots)
     )
@@ -293,7 +301,7 @@ def _judge(
             enclosed and bound != "none",
             proof,
             (),
-            _special(roots),
+            _describe_special(roots),
             None,
             bound,
             enclosed,
@@ -302,7 +310,7 @@ def _judge(
     whole = [
         mode for mode, root in zip(found, roots.real, strict=True) if not _is_beyond_platform(system, square, root)
     ]
-    at_goal = _goal(system, roots, whole, goal)
+    at_goal = _find_goal(system, roots, whole, goal)
     left = [
         mode
         for mode in whole
@@ -317,12 +325,12 @@ def _judge(
     open_ = [mode for mode in left if mode is not at_goal and mode.residual > LOCUS_DISTANCE_TOL]
     lost = goal is not None and not any(_is_goal_pose(system, mode.q, goal) for mode in left)
     if goal is not None and not any(_is_goal_pose(system, mode.q, goal) for mode in modes):
-        at_goal = _by_construction(system, goal, square.legs)  # its solution is known too roughly to match
+        at_goal = _make_goal_mode(system, goal, square.legs)  # its solution is known too roughly to match
         modes, open_ = (*modes, at_goal), [mode for mode in open_ if not _is_goal_pose(system, mode.q, goal)]
         enclosed = False
-    near = () if others is None else _near(system, found, modes, others)
+    near = () if others is None else _find_near(system, found, modes, others)
     fitting = [mode.residual for mode in modes if mode is not at_goal]
-    proof = f"from {len(square.legs)} of {len(system.curves)} tips: {proof}; of these " + words(
+    proof = f"from {len(square.legs)} of {len(system.curves)} tips: {proof}; of these " + describe_fits(
         at_goal is not None, lost, fitting, len(found) - len(left), len(open_)
     )
     kept = tuple(mode in left and mode not in open_ for mode in found)
@@ -332,7 +340,7 @@ def _judge(
         enclosed and bound != "none",
         proof,
         near,
-        _special(roots),
+        _describe_special(roots),
         None,
         bound,
         enclosed,
@@ -340,7 +348,7 @@ def _judge(
     )
 
 
-def _by_construction(system: System, goal: Array, legs: tuple[int, ...]) -> SystemMode:
+def _make_goal_mode(system: System, goal: Array, legs: tuple[int, ...]) -> SystemMode:
     """The goal as a mode whose place no solution proves."""
     return SystemMode(
         (),
@@ -354,7 +362,9 @@ def _by_construction(system: System, goal: Array, legs: tuple[int, ...]) -> Syst
     )
 
 
-def _goal(system: System, roots: SolutionSet, found: Sequence[SystemMode], goal: Array | None) -> SystemMode | None:
+def _find_goal(
+    system: System, roots: SolutionSet, found: Sequence[SystemMode], goal: Array | None
+) -> SystemMode | None:
     """The solution that is the goal: the only one that can be, where all are known."""
     if goal is None or not roots.complete:
         return None
@@ -369,7 +379,7 @@ def _is_goal_pose(system: System, q: Array, goal: Array) -> bool:
 
 def _bound(system: System, part: PoseSystem, most: Bound | None, roots: SolutionSet) -> tuple[str, str]:
     """Return the root bound beyond the solutions that a solver proposes, and the proof as text (proofs.md 8)."""
-    proof = _proof(system, roots)
+    proof = _describe_proof(system, roots)
     known = f", {roots.beyond} enclosed at infinity" if roots.beyond else ""
     known += f", the {roots.far} far ones for the rounded geometry" if roots.far else ""
     count = roots.complex + roots.beyond + roots.far
@@ -378,7 +388,7 @@ def _bound(system: System, part: PoseSystem, most: Bound | None, roots: Solution
             f"{proof}; the complex ones are enclosed too, all distinct{known}, and there are at "
             f"most {most.most}: {most.why}"
         )
-    if roots.apart and part.chart.study is None and most_zeros(part.equations(), count) == count:
+    if roots.apart and part.chart.study is None and bound_zeros(part.equations(), count) == count:
         return "rank", (
             f"{proof}; the complex ones are enclosed too, all distinct{known}, and there are no "
             "more: ranks of multiples of the equations modulo a prime of 62 bits"
@@ -387,23 +397,23 @@ def _bound(system: System, part: PoseSystem, most: Bound | None, roots: Solution
     return "none", f"{proof}; that is what the solver found{limit}"
 
 
-def _near(
+def _find_near(
     system: System, found: Sequence[SystemMode], modes: Sequence[SystemMode], others: Iterable[tuple[Part, SolutionSet]]
 ) -> tuple[SystemMode, ...]:
     """Near modes, from all solutions of one square part and of others."""
     starts = [mode.q for mode in found]
     for other, found_there in others:
-        starts += [_mode(system, other, root).q for root in found_there.real]
-    return tuple(_nearly(system, q) for q in stationary(system, starts, [mode.q for mode in modes]))
+        starts += [_make_mode(system, other, root).q for root in found_there.real]
+    return tuple(_make_near_mode(system, q) for q in find_stationary(system, starts, [mode.q for mode in modes]))
 
 
-def _mode(system: System, square: Part, root: RealSolution) -> SystemMode:
+def _make_mode(system: System, square: Part, root: RealSolution) -> SystemMode:
     parameters = tuple(float(each.mid()) for each in root.parameters)
     q = square.place(parameters)
     at = system.tips_at(q)
     if isinstance(square, SquareSystem):
         own = parameters
-        apart = system.apart(q, at, square.legs, _points(square, root))
+        apart = system.apart(q, at, square.legs, _list_points(square, root))
     else:
         own, apart = (), {k: miss + TIP_ROUNDING * system.size for k, miss in enumerate(root.misses)}
     shift, turn = system.spread(q, apart)
@@ -423,7 +433,7 @@ def _mode(system: System, square: Part, root: RealSolution) -> SystemMode:
     )
 
 
-def _points(square: SquareSystem, root: RealSolution) -> list[tuple[Array, float]]:
+def _list_points(square: SquareSystem, root: RealSolution) -> list[tuple[Array, float]]:
     """The points of a square's curves at a solution, and how far the exact ones can be from them (m)."""
     points = [curve.at(float(s.mid())) for curve, s in zip(square.unknowns, root.parameters, strict=True)]
     return list(zip(points, root.misses, strict=True))
@@ -437,7 +447,7 @@ def _is_beyond_platform(system: System, square: Part, root: RealSolution) -> boo
         and system.rigid
         and _is_proved_for_input(system, root)
         and any(isinstance(system.curves[k], Point) for k in square.legs)
-        and is_beyond_rigid_platform(system, system.known_tips(square.legs, _points(square, root)))
+        and is_beyond_rigid_platform(system, system.known_tips(square.legs, _list_points(square, root)))
     )
 
 
@@ -446,13 +456,13 @@ def _is_proved_for_input(system: System, root: RealSolution) -> bool:
     return bool(np.isfinite(system.error) and root.unique and root.thick)
 
 
-def _nearly(system: System, q: Array) -> SystemMode:
+def _make_near_mode(system: System, q: Array) -> SystemMode:
     return SystemMode(
-        (), np.inf, np.inf, np.pi, residual(system, q), freeze_array(system.pose(q)), freeze_array(q), near=True
+        (), np.inf, np.inf, np.pi, compute_residual(system, q), freeze_array(system.pose(q)), freeze_array(q), near=True
     )
 
 
-def _proof(system: System, roots: SolutionSet) -> str:
+def _describe_proof(system: System, roots: SolutionSet) -> str:
     if not roots.degree and roots.complex:
         return "fixed tips, which leave one pose"
     text = f"{roots.method} of degree {roots.degree}"
@@ -478,7 +488,7 @@ def _proof(system: System, roots: SolutionSet) -> str:
     return text
 
 
-def _special(roots: SolutionSet) -> str | None:
+def _describe_special(roots: SolutionSet) -> str | None:
     if roots.undecided:
         return (
             "the solutions of all distances are counted: undecided which of them a snapped geometry sends to infinity"
