@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..analysis.loci.carrying_leg_system import CarriedCondition, CarriedPlatform, Turn
-from ..analysis.modes.carrying_leg_modes import enclose_zeros, measure_joint_distances, proposals
+from ..analysis.modes.carrying_leg_modes import enclose_zeros, measure_joint_distances, propose_zeros
 from ..geometry.vectors import Array
 from ..solving.newton import SAME_ZERO_DISTANCE_TOL
 from ..solving.platform.pose_conditions import AtAngle, OnPlane, OnRevolution
@@ -70,7 +70,7 @@ def write_chain(system: CarriedPlatform, found: Sequence[Array]) -> ToldChain:
         record["reaches"].append(reach)
         record["ends"].append([min(_carriers(each)), max(_carriers(each)) + 1, arrow])
     turn, starts = np.exp(-1j * off), Starts()
-    for box in enclose_zeros(system, proposals(system, system.most(system.square))):
+    for box in enclose_zeros(system, propose_zeros(system, system.most(system.square))):
         c, s, t = box.middle[:n], box.middle[n : 2 * n], box.middle[2 * n :]
         c, s = c * turn.real - s * turn.imag, s * turn.real + c * turn.imag
         starts.append((np.where(slides, t, s / (1.0 + c)).tolist(), box.real))

@@ -11,10 +11,10 @@ import hrsynth
 from analysis.modes.ankles import LEGS, ankle, carried, counted
 from analysis.modes.test_robots import check_completeness, check_modes, same_modes
 from analysis.modes.test_surfaces import needs_msolve
-from hrsynth.analysis.loci.carrying_leg import carried_platform
-from hrsynth.analysis.loci.joint_forms import closings_bound, eigenvalues
+from hrsynth.analysis.loci.carrying_leg import build_carried_platform
+from hrsynth.analysis.loci.joint_forms import count_closures, find_closures
 from hrsynth.analysis.measured import MeasuredRobot
-from hrsynth.analysis.modes.carrying_leg_modes import polish_zeros, proposals
+from hrsynth.analysis.modes.carrying_leg_modes import polish_zeros, propose_zeros
 from hrsynth.errors import UnsupportedLocus
 from hrsynth.geometry.vectors import build_pose, rotate_about_axis
 from hrsynth.mechanism.model import Motor
@@ -117,12 +117,12 @@ def test_three_joints_and_three_balls_have_their_number_of_modes(word: str, on: 
 def test_ranks_and_degrees_leave_the_same_number(word: str):
     for seed in range(2, 4):
         measured = MeasuredRobot.of(hrsynth.observe(carried(word, seed)), real=True)
-        system = carried_platform(measured, measured.setup.all_samples.start, 1e-12)
-        counted = closings_bound(system, system.square)
+        system = build_carried_platform(measured, measured.setup.all_samples.start, 1e-12)
+        counted = count_closures(system, system.square)
         assert counted is not None
         assert counted.most == system.most(system.square)
-        found = polish_zeros(system, [eigenvalues(system, system.square, counted)])
-        others = proposals(system, counted.most)
+        found = polish_zeros(system, [find_closures(system, system.square, counted)])
+        others = propose_zeros(system, counted.most)
         assert len(found) == len(others) == counted.most
         for q in others:
             assert min(np.abs(system.unknowns(q) - system.unknowns(each)).max() for each in found) < 1e-6
@@ -135,8 +135,8 @@ def test_how_a_robot_stands_does_not_change_what_its_leg_leaves(seed: int):
     robot = robot.changed(joints=[replace(robot.joints[f"joint_{k}"], axes=(axis,)) for k in range(2)])
     R = random_rotation(rng)
     measured = MeasuredRobot.of(hrsynth.observe(transformed(robot, R, rng.normal(size=3)), samples=4), real=True)
-    system = carried_platform(measured, measured.setup.all_samples.start, 1e-12)
-    counted = closings_bound(system, system.square)
+    system = build_carried_platform(measured, measured.setup.all_samples.start, 1e-12)
+    counted = count_closures(system, system.square)
     assert counted is not None
     assert counted.most == 6
     q = rng.normal(size=2)
@@ -149,7 +149,7 @@ def test_motors_on_all_joints_of_a_leg_leave_it_no_way():
     driven = robot.changed(joints=[replace(robot.joints[f"joint_{k}"], motor=Motor(f"motor_{k}")) for k in range(2)])
     measured = MeasuredRobot.of(hrsynth.observe(driven, samples=4), real=True)
     with pytest.raises(UnsupportedLocus):
-        carried_platform(measured, measured.setup.all_samples.start, 1e-12)
+        build_carried_platform(measured, measured.setup.all_samples.start, 1e-12)
 
 
 @pytest.mark.long

@@ -28,24 +28,24 @@ from ...tolerances import (
 )
 from ..measured import MeasuredRobot
 from .carrying_leg_system import CarriedCondition, CarriedPlatform, Turn
-from .leg_conditions import OriginAndUnit, leg_conditions, rigid_platform
-from .observation_loci import conditions, sights
+from .leg_conditions import OriginAndUnit, list_leg_conditions, require_rigid_platform
+from .observation_loci import list_plane_conditions, separate_sights
 
 
-def carried_platform(measured: MeasuredRobot, goal: ClosedConfiguration, error: float) -> CarriedPlatform:
+def build_carried_platform(measured: MeasuredRobot, goal: ClosedConfiguration, error: float) -> CarriedPlatform:
     """Return the platform on the leg that gives the fewest zeros. Raises ``UnsupportedLocus`` if none carries it, or if
     the conditions of the others are not known."""
     decomposition, name = measured.setup.decomposition, measured.setup.robot.name
-    body, middle = rigid_platform(measured, goal)
-    rest, seen = sights(decomposition, measured.observation_model, goal)
+    body, middle = require_rigid_platform(measured, goal)
+    rest, seen = separate_sights(decomposition, measured.observation_model, goal)
     found, reason = list[CarriedPlatform](), "no leg of R and P carries its platform"
     for leg in decomposition.legs:
         try:
-            freedoms, told = _carrier(measured, leg, rest, goal, middle)
+            freedoms, told = _list_carriers(measured, leg, rest, goal, middle)
             moved = 0.0
             for other in decomposition.legs:
                 if other is not leg:
-                    branches, off = leg_conditions(decomposition, other, rest, goal, middle)
+                    branches, off = list_leg_conditions(decomposition, other, rest, goal, middle)
                     if len(branches) > 1:
                         raise UnsupportedLocus(name, f"leg {other.label} has {len(branches)} solutions")
                     told += [(c, len(freedoms)) for c in branches[0]]
@@ -53,8 +53,8 @@ def carried_platform(measured: MeasuredRobot, goal: ClosedConfiguration, error: 
         except UnsupportedLocus as refused:
             reason = refused.reason
             continue
-        told += [(c, len(freedoms)) for c in conditions(seen, middle, False)]
-        rows, turns, alike, off = _exactly(freedoms, [c for c, _ in told])
+        told += [(c, len(freedoms)) for c in list_plane_conditions(seen, middle, False)]
+        rows, turns, alike, off = _snap_exactly(freedoms, [c for c, _ in told])
         asked = [CarriedCondition.of(c, turns[:joints]) for c, (_, joints) in zip(alike, told, strict=True)]
         moved += middle.size * (off + max((each.moved for each in asked), default=0.0))
         error_ = error + MOVED_AXIS_LEVER_MAX * moved + max([0.0, *(sight.error(error, goal) for sight in seen)])
@@ -71,12 +71,12 @@ def carried_platform(measured: MeasuredRobot, goal: ClosedConfiguration, error: 
     return min(found, key=lambda each: each.most(each.square))
 
 
-def _exactly(
+def _snap_exactly(
     freedoms: Sequence[Turn], conditions: Sequence[PoseCondition]
 ) -> tuple[Array, tuple[Turn, ...], list[PoseCondition], float]:
     """Turns and conditions in rows along the first axes, so that what is parallel, at right angles, in one point or on
     one axis is so exactly, as ranks want it; and how far that moves anything (sizes)."""
-    moved, turns, rows = CHAIN_ROUNDING, list[Turn](), _rows([each.axis for each in freedoms])
+    moved, turns, rows = CHAIN_ROUNDING, list[Turn](), _build_rows([each.axis for each in freedoms])
 
     def near(v: Array, others: Iterable[Array], within: float) -> Array:
         nonlocal moved
@@ -119,7 +119,7 @@ def _exactly(
     return rows, tuple(turns), found, moved
 
 
-def _rows(axes: Sequence[Array]) -> Array:
+def _build_rows(axes: Sequence[Array]) -> Array:
     """A frame (3, 3), its third row along the first axis, its second at right angles to the first other one."""
     if not axes:
         return np.eye(3)
@@ -131,7 +131,7 @@ def _rows(axes: Sequence[Array]) -> Array:
     return np.stack([np.cross(y, z), y, z])
 
 
-def freedoms_of(
+def list_freedoms(
     joint: Joint, at: str, goal: ClosedConfiguration, middle: OriginAndUnit, held: Sequence[str]
 ) -> list[Turn]:
     """Return the unlocked axes of a joint of R and P, seen from a link, none if it is ``held``. Raises
@@ -147,7 +147,7 @@ def freedoms_of(
     return found
 
 
-def _carrier(
+def _list_carriers(
     measured: MeasuredRobot, leg: Leg, rest: ObservationModel, goal: ClosedConfiguration, middle: OriginAndUnit
 ) -> tuple[tuple[Turn, ...], list[tuple[PoseCondition, int]]]:
     """Return the unlocked joints of a leg, from the base, and its observations, with the number of joints that carry
@@ -163,7 +163,7 @@ def _carrier(
     for edge in path:
         if len(edge.joints) > 1:
             raise UnsupportedLocus(mechanism.name, f"leg {leg.label} is not one of R and P")
-        found += freedoms_of(mechanism.joints[edge.joints[0]], at, goal, middle, held)
+        found += list_freedoms(mechanism.joints[edge.joints[0]], at, goal, middle, held)
         at = edge.other(at)
         links[at] = len(found)
     told, none = list[tuple[PoseCondition, int]](), np.zeros(3)

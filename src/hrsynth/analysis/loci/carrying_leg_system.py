@@ -64,7 +64,7 @@ class CarriedCondition:
         """With the joints before which nothing rotates the base point, or after which nothing rotates the point of the
         body."""
         idle, off = set[int](), 0.0
-        for order, misses in ((range(len(freedoms)), _before), (range(len(freedoms))[::-1], _after)):
+        for order, misses in ((range(len(freedoms)), _measure_before), (range(len(freedoms))[::-1], _measure_after)):
             for k in order:
                 miss = misses(condition, freedoms[k])
                 if miss > DIRECTION_SINE_TOL:
@@ -86,7 +86,7 @@ class CarriedCondition:
         return 2 * (1 if once else 2 if around else c.degree)
 
 
-def _before(c: PoseCondition, freedom: Turn) -> float:
+def _measure_before(c: PoseCondition, freedom: Turn) -> float:
     """Return how far a joint next to the base is from leaving a condition unchanged; infinite if it is of another
     kind."""
     a = freedom.axis
@@ -100,7 +100,7 @@ def _before(c: PoseCondition, freedom: Turn) -> float:
     return np.inf
 
 
-def _after(c: PoseCondition, freedom: Turn) -> float:
+def _measure_after(c: PoseCondition, freedom: Turn) -> float:
     """Return that distance for a joint next to the body."""
     a, turned = freedom.axis, float(np.linalg.norm(np.cross(c.c, freedom.axis)))
     if freedom.slides:
@@ -243,12 +243,12 @@ class CarriedPlatform(System):
                 if i != one and chosen[i].joints == chosen[one].joints:
                     table[i] = np.maximum(degrees[i], degrees[one])
                     table[i, slides] = np.minimum(table[i, slides], 1)
-        found = [permanent(table) for table in tables]
+        found = [compute_permanent(table) for table in tables]
         for (i, j), table in product(combinations(range(n), 2), tables):
             rest = [k for k in range(n) if k not in (i, j)]
             if self._has_common_point(chosen[i], chosen[j]) and not table[rest, 0].any():
                 bent = np.where(degrees[[i, j], 1:].any(axis=0), 4, 0)
-                found.append(permanent(np.vstack([bent, table[rest, 1:]])))
+                found.append(compute_permanent(np.vstack([bent, table[rest, 1:]])))
         return min(found)
 
     def _has_common_point(self, one: CarriedCondition, other: CarriedCondition) -> bool:
@@ -290,6 +290,6 @@ class CarriedPlatform(System):
         )
 
 
-def permanent(degrees: Array) -> int:
+def compute_permanent(degrees: Array) -> int:
     """Bézout's number in a product of lines."""
     return sum(prod(int(degrees[i, j]) for i, j in enumerate(order)) for order in permutations(range(len(degrees))))

@@ -21,7 +21,7 @@ import numpy as np
 
 from ...geometry.ranks import decompose_matrix
 from ...geometry.vectors import Array, hat
-from ...solving.platform.pose_bound import PRIME, QUATERNION_POWERS_MAX, compute_residues
+from ...solving.platform.pose_bound import PRIME, QUATERNION_POWERS_MAX, reduce_mod
 from ...tolerances import FORM_PIVOT_MIN_FRACTION
 
 if TYPE_CHECKING:
@@ -40,23 +40,23 @@ class ClosureCount:
     k: int
 
 
-def _steps(freedoms: Sequence[Turn]) -> list[int]:
+def _list_steps(freedoms: Sequence[Turn]) -> list[int]:
     """The degrees of w."""
     return [1 if each.slides else 2 for each in freedoms]
 
 
-def _degrees(system: CarriedPlatform, chosen: Sequence[CarriedCondition]) -> list[list[int]]:
+def _list_degrees(system: CarriedPlatform, chosen: Sequence[CarriedCondition]) -> list[list[int]]:
     return [[each.degree(k, f) for k, f in enumerate(system.freedoms_)] for each in chosen]
 
 
-def closings_bound(system: CarriedPlatform, chosen: Sequence[CarriedCondition]) -> ClosureCount | None:
+def count_closures(system: CarriedPlatform, chosen: Sequence[CarriedCondition]) -> ClosureCount | None:
     """D of some conditions, as many as joints; None where there are infinitely many, or the forms would be too many."""
-    steps, degrees = _steps(system.freedoms_), _degrees(system, chosen)
+    steps, degrees = _list_steps(system.freedoms_), _list_degrees(system, chosen)
     # from these degrees on, were all zeros isolated, there are as many functionals as zeros
     t = [max(2 * by, -(-sum(column) // by) * by) for by, column in zip(steps, zip(*degrees, strict=True), strict=True)]
     joint = 0
     while prod(d + 1 for d in t) <= JOINT_FORMS_MAX:
-        found = _dimensions(system, chosen, degrees, steps, t)
+        found = _compute_dimensions(system, chosen, degrees, steps, t)
         for k, (one, other) in enumerate(pairwise(found)):
             if one == other:
                 return ClosureCount(one, tuple(t), k)
@@ -65,16 +65,16 @@ def closings_bound(system: CarriedPlatform, chosen: Sequence[CarriedCondition]) 
     return None
 
 
-def eigenvalues(system: CarriedPlatform, chosen: Sequence[CarriedCondition], counted: ClosureCount) -> Array:
+def find_closures(system: CarriedPlatform, chosen: Sequence[CarriedCondition], counted: ClosureCount) -> Array:
     """All closings q (n, joints), complex, to rounding: functionals on exp(i m q) and powers of slides that vanish on
     the multiples of the conditions, on which the multiplication by exp(i q), or by a slide, has them as eigenvalues."""
     from scipy.linalg import qr
 
     freedoms, t = system.freedoms_, counted.t
-    steps = np.array(_steps(freedoms))
+    steps = np.array(_list_steps(freedoms))
     sizes, rows = [d + 1 for d in t], []
-    for each, own in zip(chosen, _degrees(system, chosen), strict=True):
-        coefficients = _coefficients(system, each, own)
+    for each, own in zip(chosen, _list_degrees(system, chosen), strict=True):
+        coefficients = _compute_coefficients(system, each, own)
         for first in product(*(range(d - e + 1) for d, e in zip(t, own, strict=True))):
             row = np.zeros(sizes, dtype=complex)
             row[tuple(slice(f, f + e + 1) for f, e in zip(first, own, strict=True))] = coefficients
@@ -83,11 +83,13 @@ def eigenvalues(system: CarriedPlatform, chosen: Sequence[CarriedCondition], cou
     Q, upper, _ = qr(matrix.conj().T, pivoting=True)
     pivots = np.abs(np.diag(upper))
     kernel = Q[:, int(np.sum(pivots > FORM_PIVOT_MIN_FRACTION * pivots[0])) :]
-    lower = _within(sizes, steps, counted.k, np.zeros(len(t), dtype=int))
+    lower = _place_within(sizes, steps, counted.k, np.zeros(len(t), dtype=int))
     space = decompose_matrix(kernel[lower])[0][:, : counted.most]
     place = {index: i for i, index in enumerate(lower)}
-    home = [place[i] for i in _within(sizes, steps, counted.k + 1, np.zeros(len(t), dtype=int))]
-    moved = [[place[i] for i in _within(sizes, steps, counted.k + 1, shift)] for shift in np.eye(len(t), dtype=int)]
+    home = [place[i] for i in _place_within(sizes, steps, counted.k + 1, np.zeros(len(t), dtype=int))]
+    moved = [
+        [place[i] for i in _place_within(sizes, steps, counted.k + 1, shift)] for shift in np.eye(len(t), dtype=int)
+    ]
     by = np.array([np.linalg.lstsq(space[home], space[each], rcond=None)[0] for each in moved])
     _, X = np.linalg.eig(np.einsum("kij,k->ij", by, np.random.default_rng(1).normal(size=len(t))))
     found = np.einsum("ij,kjl,li->ik", np.linalg.inv(X), by, X)
@@ -96,7 +98,7 @@ def eigenvalues(system: CarriedPlatform, chosen: Sequence[CarriedCondition], cou
         return np.asarray(np.where(slides, found, -1j * np.log(found)))
 
 
-def _coefficients(system: CarriedPlatform, told: CarriedCondition, own: Sequence[int]) -> Array:
+def _compute_coefficients(system: CarriedPlatform, told: CarriedCondition, own: Sequence[int]) -> Array:
     """Return the value at exp(i m q), |m| up to half the degree, and at powers of slides; one axis a joint."""
     nodes = [
         np.cos(np.pi * (np.arange(d + 1) + 0.5) / (d + 1)) if f.slides else 2 * np.pi * np.arange(d + 1) / (d + 1)
@@ -110,7 +112,7 @@ def _coefficients(system: CarriedPlatform, told: CarriedCondition, own: Sequence
     return np.asarray(found / np.abs(found).max())
 
 
-def _within(sizes: Sequence[int], steps: Array, k: int, shift: Array) -> list[int]:
+def _place_within(sizes: Sequence[int], steps: Array, k: int, shift: Array) -> list[int]:
     """The places of the forms of degrees less those of Wᵏ, each moved by what is multiplied: of turns around the
     middle, of slides from zero."""
     start = np.where(steps == 2, k, 0) + shift
@@ -118,7 +120,7 @@ def _within(sizes: Sequence[int], steps: Array, k: int, shift: Array) -> list[in
     return [int(np.ravel_multi_index(tuple(start + at), sizes)) for at in np.ndindex(*size)]
 
 
-def _dimensions(
+def _compute_dimensions(
     system: CarriedPlatform,
     chosen: Sequence[CarriedCondition],
     degrees: Sequence[Sequence[int]],
@@ -130,7 +132,7 @@ def _dimensions(
 
     count = prod(d + 1 for d in t)
     points = np.random.default_rng(0).integers(1, PRIME, size=(2, len(t), count)).astype(object)
-    axes = [compute_residues(each.axis) for each in system.freedoms_]
+    axes = [reduce_mod(each.axis) for each in system.freedoms_]
     w = [
         y if each.slides else (y * y + z * z * (a @ a)) % PRIME
         for each, a, y, z in zip(system.freedoms_, axes, *points, strict=True)
@@ -138,10 +140,10 @@ def _dimensions(
     moves = [_move(each, a, y, z, v) for each, a, y, z, v in zip(system.freedoms_, axes, *points, w, strict=True)]
     rows = []
     for each, own in zip(chosen, degrees, strict=True):
-        value = _value(system, each, moves)
+        value = _evaluate(system, each, moves)
         for v, d, by in zip(w, own, least, strict=True):
-            value = value * _power(v, d // by) % PRIME
-        rows.append(_monomials(points, [d - e for d, e in zip(t, own, strict=True)]) * value % PRIME)
+            value = value * _raise_power(v, d // by) % PRIME
+        rows.append(_evaluate_monomials(points, [d - e for d, e in zip(t, own, strict=True)]) * value % PRIME)
     kernel, size = nmod_mat(np.vstack(rows).tolist(), PRIME).nullspace()
     columns = np.array([[int(v) for v in row[:size]] for row in kernel.table()], dtype=object).reshape(count, size)
     found = []
@@ -149,7 +151,9 @@ def _dimensions(
         left = [d - k * by for d, by in zip(t, least, strict=True)]
         if min(left) < 0:
             break
-        found.append((nmod_mat(_monomials(points, left).tolist(), PRIME) * nmod_mat(columns.tolist(), PRIME)).rank())
+        found.append(
+            (nmod_mat(_evaluate_monomials(points, left).tolist(), PRIME) * nmod_mat(columns.tolist(), PRIME)).rank()
+        )
         for v in w:
             columns = columns * v[:, None] % PRIME
     return found
@@ -162,36 +166,36 @@ def _move(freedom: Turn, a: Any, y: Any, z: Any, w: Any) -> tuple[Any, Any]:
     if freedom.slides:
         return np.broadcast_to(one, (len(y), 3, 3)), np.multiply.outer(z * inverse % PRIME, a) % PRIME
     along = np.multiply.outer(a, a) % PRIME
-    across = compute_residues(hat(freedom.axis))
+    across = reduce_mod(hat(freedom.axis))
     squares, both = y * y - z * z * (a @ a) % PRIME, 2 * y * z
     turn = (squares[:, None, None] * one + (2 * z * z)[:, None, None] * along + both[:, None, None] * across) % PRIME
     turn = turn * inverse[:, None, None] % PRIME
-    o = compute_residues(freedom.point)
+    o = reduce_mod(freedom.point)
     return turn, (o - turn @ o) % PRIME
 
 
-def _value(system: CarriedPlatform, told: CarriedCondition, moves: Sequence[tuple[Any, Any]]) -> Any:
+def _evaluate(system: CarriedPlatform, told: CarriedCondition, moves: Sequence[tuple[Any, Any]]) -> Any:
     """Return the values of a condition (n,), without joints that leave it unchanged."""
     count = len(moves[0][0])
-    x, d = (np.broadcast_to(compute_residues(v), (count, 3)) for v in (told.condition.b, told.condition.c))
+    x, d = (np.broadcast_to(reduce_mod(v), (count, 3)) for v in (told.condition.b, told.condition.c))
     for k in range(told.joints - 1, -1, -1):
         if k not in told.idle:
             turn, shift = moves[k]
             x = (np.sum(turn * x[:, None, :], axis=2) + shift) % PRIME
             d = np.sum(turn * d[:, None, :], axis=2) % PRIME
-    return told.condition.value(x, d, compute_residues) % PRIME
+    return told.condition.value(x, d, reduce_mod) % PRIME
 
 
-def _monomials(points: Array, t: Sequence[int]) -> Any:
+def _evaluate_monomials(points: Array, t: Sequence[int]) -> Any:
     """All of the degrees; shape (forms, points)."""
     found = [np.ones(points.shape[2], dtype=int).astype(object)]
     for y, z, d in zip(*points, t, strict=True):
-        each = [_power(y, d - e) * _power(z, e) % PRIME for e in range(d + 1)]
+        each = [_raise_power(y, d - e) * _raise_power(z, e) % PRIME for e in range(d + 1)]
         found = [one * other % PRIME for one, other in product(found, each)]
     return np.array(found, dtype=object)
 
 
-def _power(v: Any, e: int) -> Any:
+def _raise_power(v: Any, e: int) -> Any:
     total = v * 0 + 1
     for _ in range(e):
         total = total * v % PRIME

@@ -87,10 +87,10 @@ class Chain:
     @property
     def moved(self) -> float:
         """Distance that axes and centres were moved so that they meet, coincide or are parallel, all together (m)."""
-        return self.off + self.extent * _parallel_angles(self.bodies)
+        return self.off + self.extent * _measure_parallel_angles(self.bodies)
 
 
-def chain(
+def build_chain(
     decomposition: LegDecomposition,
     leg: Leg,
     held: Sequence[Observation],
@@ -111,7 +111,7 @@ def chain(
     return Chain(bodies, end != "free" if isinstance(end, str) else True, goal.model.length, off)
 
 
-def _parallel_angles(bodies: Sequence[ChainBody]) -> float:
+def _measure_parallel_angles(bodies: Sequence[ChainBody]) -> float:
     """The angles (rad) of all pairs of directions of a chain that count as parallel, and are not but for rounding."""
     found = [
         d
@@ -283,7 +283,7 @@ def _shift_bodies(bodies: Sequence[ChainBody], tip: Array, small: float) -> tupl
         point, off = (
             (body.point, 0.0)
             if body.axis is None
-            else _meeting(body, before, after, tip if k + 1 == len(bodies) and body.is_rigid else None, small)
+            else _find_meeting(body, before, after, tip if k + 1 == len(bodies) and body.is_rigid else None, small)
         )
         points.append(point)
         moved += off if off > CHAIN_ROUNDING * (small / POINT_DISTANCE_TOL) else 0.0
@@ -294,7 +294,7 @@ def _shift_bodies(bodies: Sequence[ChainBody], tip: Array, small: float) -> tupl
     return tuple(found), moved
 
 
-def _meeting(
+def _find_meeting(
     body: ChainBody, before: ChainBody | None, after: ChainBody | None, tip: Array | None, small: float
 ) -> tuple[Array, float]:
     """The point of a body's axis at which a ball, the tip or a neighbour's axis is, else its own; and how far from the

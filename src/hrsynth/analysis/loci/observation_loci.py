@@ -27,7 +27,7 @@ from ...solving.platform.pose_conditions import AtAngle, OnMovingPlane, OnPlane,
 from ...tolerances import CHAIN_ROUNDING, EXACT_INCIDENCE_TOL, MOVED_AXIS_LEVER_MAX
 from ..measured import MeasuredRobot
 from .leg_conditions import OriginAndUnit
-from .tips import KeptAngle, Tip, TipLoci, tip_loci
+from .tips import KeptAngle, Tip, TipLoci, derive_tip_loci
 
 MEASURED_VALUE_TOL = 1e-3
 """Difference of measured values (unit vectors; characteristic lengths) up to which a mode has the desired value."""
@@ -59,7 +59,7 @@ class PlatformObservation:
         return MOVED_AXIS_LEVER_MAX * (exact * max(1.0, far / ROTATION_LEVER_MIN) + rounding) * bent
 
 
-def sights(
+def separate_sights(
     decomposition: LegDecomposition, observation_model: ObservationModel, goal: ClosedConfiguration
 ) -> tuple[ObservationModel, tuple[PlatformObservation, ...]]:
     """Return the observations of legs, by their labels, and the others. Raises ``UnsupportedLocus`` if the locus of an
@@ -78,11 +78,11 @@ def sights(
                 raise UnsupportedLocus(decomposition.mechanism.name, f"the locus of {each.text} is not known")
             found.append(PlatformObservation(each, body, loci, body == reference))
         else:
-            rest.append(_of_leg(decomposition, each))
+            rest.append(_set_leg(decomposition, each))
     return replace(observation_model, observations=tuple(rest)), tuple(found)
 
 
-def _of_leg(decomposition: LegDecomposition, seen: Observation) -> Observation:
+def _set_leg(decomposition: LegDecomposition, seen: Observation) -> Observation:
     """The coordinate of a leg's joint, or the direction of a leg's link, as the leg's; that of a joint inside the
     platform as of no leg."""
     joint = decomposition.mechanism.joints.get(seen.joint) if isinstance(seen, Encoder) else None
@@ -98,7 +98,7 @@ def _of_leg(decomposition: LegDecomposition, seen: Observation) -> Observation:
     raise UnsupportedLocus(decomposition.mechanism.name, f"{seen.text} is of no leg and not between base and platform")
 
 
-def _with_sights(confined: TipLoci, seen: Sequence[PlatformObservation], goal: ClosedConfiguration) -> TipLoci:
+def _add_sights(confined: TipLoci, seen: Sequence[PlatformObservation], goal: ClosedConfiguration) -> TipLoci:
     """Return a platform with its observations. Raises ``UnsupportedLocus`` if these are not points on loci in the base:
     cameras on the platform beside legs that restrict it, angles in a plane."""
     turning = confined.motion in ("spatial", "oriented")
@@ -124,30 +124,32 @@ def _with_sights(confined: TipLoci, seen: Sequence[PlatformObservation], goal: C
                 angles += [KeptAngle(label, each.body, X[:3, :3].T @ d, axis, 0.0) for d, axis in pairs]
                 continue
             place, through = (locus.through, locus.place) if turned else (locus.place, locus.through)
-            reach = _reach(replace(locus, place=place, through=through), confined.plane)
+            reach = _convert_locus(replace(locus, place=place, through=through), confined.plane)
             if reach is not None:
                 tips.append(Tip(label, each.body, X[:3, :3].T @ (place - X[:3, 3]), reach))
     return replace(confined, tips=tuple(tips), angles=tuple(angles), back=back)
 
 
-def all_loci(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[TipLoci, tuple[PlatformObservation, ...]]:
+def derive_all_loci(
+    measured: MeasuredRobot, goal: ClosedConfiguration
+) -> tuple[TipLoci, tuple[PlatformObservation, ...]]:
     """Return the loci of tips of legs and observed points, all other measured values fixed; and the observations.
     Raises ``UnsupportedLocus``."""
     setup = measured.setup
-    rest, seen = sights(setup.decomposition, measured.observation_model, goal)
+    rest, seen = separate_sights(setup.decomposition, measured.observation_model, goal)
     if not seen:
-        return tip_loci(setup.decomposition, rest, measured.generic_pattern, goal), ()
+        return derive_tip_loci(setup.decomposition, rest, measured.generic_pattern, goal), ()
     if rest.observations:
         pattern = recognise(setup.decomposition, rest, setup.configurations, everywhere=False)
-        confined = tip_loci(setup.decomposition, rest, pattern, goal)
+        confined = derive_tip_loci(setup.decomposition, rest, pattern, goal)
     else:
-        confined = _unheld(measured, goal)
+        confined = _build_unheld(measured, goal)
     if confined.motion == "translations" and setup.dof < 3:
         raise UnsupportedLocus(setup.robot.name, "its legs restrict how the platform moves")
-    return _with_sights(confined, seen, goal), seen
+    return _add_sights(confined, seen, goal), seen
 
 
-def _unheld(measured: MeasuredRobot, goal: ClosedConfiguration) -> TipLoci:
+def _build_unheld(measured: MeasuredRobot, goal: ClosedConfiguration) -> TipLoci:
     """Return a platform without a leg. Raises ``UnsupportedLocus`` if legs restrict its motion."""
     decomposition, dof = measured.setup.decomposition, measured.setup.dof
     bodies, (motion, normal) = list_leg_ends(decomposition), measured.moving
@@ -161,7 +163,7 @@ def _is_symmetric_kind(sight: PlatformObservation) -> bool:
     return all(each.turns or len(each.normals) in (0, 3) for each in sight.loci)
 
 
-def _reach(locus: FixedValueLocus, plane: Array | None) -> Reach | None:
+def _convert_locus(locus: FixedValueLocus, plane: Array | None) -> Reach | None:
     """Return the locus of a point that moves in space, or in the plane through it with a normal; None: anywhere
     there."""
     if plane is None:
@@ -180,7 +182,9 @@ def _reach(locus: FixedValueLocus, plane: Array | None) -> Reach | None:
     return None if not rank else Line(locus.place, np.cross(plane, rows[0])) if rank == 1 else Point(locus.place)
 
 
-def conditions(seen: Sequence[PlatformObservation], middle: OriginAndUnit, turned: bool) -> list[PoseCondition]:
+def list_plane_conditions(
+    seen: Sequence[PlatformObservation], middle: OriginAndUnit, turned: bool
+) -> list[PoseCondition]:
     """Return the conditions on the platform's pose, relative to the goal, of a camera on it that observes moving
     planes; or, ``turned``, on the base's relative to the platform."""
     found, none, up = list[PoseCondition](), np.zeros(3), np.array([0.0, 0.0, 1.0])
@@ -209,7 +213,9 @@ def conditions(seen: Sequence[PlatformObservation], middle: OriginAndUnit, turne
 Poses = Callable[[str], Array]
 
 
-def opposite(seen: Sequence[Observation], goal: ClosedConfiguration, reference: str, pose: Poses) -> tuple[str, ...]:
+def list_opposite(
+    seen: Sequence[Observation], goal: ClosedConfiguration, reference: str, pose: Poses
+) -> tuple[str, ...]:
     """Return the observations whose value at a pose of the links is the opposite of the goal's."""
     return tuple(each.leg for each in seen if not _has_goal_value(each, each.seen_from or reference, goal, pose))
 
@@ -223,7 +229,7 @@ def _has_goal_value(seen: Observation, reference: str, goal: ClosedConfiguration
     return bool(np.all(np.abs(off / goal.model.length ** np.asarray(seen.dimension)) <= MEASURED_VALUE_TOL))
 
 
-def behind(observed: Sequence[Observation], pose: Poses) -> tuple[str, ...] | None:
+def list_behind(observed: Sequence[Observation], pose: Poses) -> tuple[str, ...] | None:
     """Return the observed points and circles that are not in front of their cameras, by their names: z ≤ 0 in the
     camera's frame; None if no named camera observes a point."""
     points = [o for o in observed if isinstance(o, CameraObservation) and o.camera is not None and o.images_point]

@@ -20,7 +20,7 @@ from ...mechanism.pose import Pose
 from ...records import FLAT, As, Number, Record, Recorded, Shown
 from ...solving.platform.solve import SystemMode
 from ...tolerances import CLOSURE_RESIDUAL_TOL, RELATION_ANGLE_TOL
-from ..loci.observation_loci import behind, opposite, sights
+from ..loci.observation_loci import list_behind, list_opposite, separate_sights
 from ..observed import ObservedRobot
 from ..singularity.condition_check import compute_smallest_value
 from .branches import Model
@@ -116,7 +116,7 @@ class AssemblyMode(OfConfiguration, Record):
     closure_failures = Shown(list[LegReachFailure], lambda self: [LegReachFailure(*each) for each in self.misses])
 
 
-def found_mode(
+def build_mode(
     setup: ObservedRobot,
     observation_model: ObservationModel,
     at: ClosedConfiguration,
@@ -142,7 +142,7 @@ def found_mode(
         at,
         length=at.model.length,
         bodies=bodies,
-        behind=behind(observation_model.observations, at.pose),
+        behind=list_behind(observation_model.observations, at.pose),
     )
 
 
@@ -154,7 +154,7 @@ class ModeReader:
     ) -> None:
         self.question, self.motion, self.made, self.goal = observation_model, setup.motion, made, goal
         self.assembler = Assembler(setup.decomposition, goal.model.length, observation_model.reference)
-        rest, self.seen = sights(setup.decomposition, observation_model, goal)
+        rest, self.seen = separate_sights(setup.decomposition, observation_model, goal)
         self.measured = FixedValuesTask.at(goal.model, goal.q, observation_model.reference, rest.observations).measured
 
     def away(self, mode: SystemMode) -> float:
@@ -173,7 +173,7 @@ class ModeReader:
         scale = self.made.system.size / size
         base = self.goal.model.mechanism.base
         pose = {base: self.goal.pose(base), **bodies}.__getitem__
-        antipodal = opposite([each.seen for each in self.seen], self.goal, self.question.reference, pose)
+        antipodal = list_opposite([each.seen for each in self.seen], self.goal, self.question.reference, pose)
         found = Assembly(self.goal)
         if antipodal:  # not a mode: the assembly of the robot is not computed
             found = Assembly(None, platform=self.assembler.platform(bodies))
@@ -213,7 +213,7 @@ class ModeReader:
             size,
             bodies,
             antipodal,
-            behind([each.seen for each in self.seen], pose),
+            list_behind([each.seen for each in self.seen], pose),
             found.gears,
         )
 

@@ -28,9 +28,9 @@ from ...solving.platform.pose_boxes import (
 from ...solving.platform.pose_conditions import PoseCondition
 from ...solving.platform.pose_forms import Poses
 from ...solving.platform.solve import SystemMode, SystemModes
-from ..loci.carrying_leg import carried_platform
+from ..loci.carrying_leg import build_carried_platform
 from ..loci.carrying_leg_system import CarriedCondition, CarriedEquation, CarriedPlatform
-from ..loci.joint_forms import closings_bound, eigenvalues
+from ..loci.joint_forms import count_closures, find_closures
 from ..measured import MeasuredRobot
 from .branches import Model
 
@@ -97,7 +97,7 @@ def measure_joint_distances(slides: Array, x: Array, y: Array) -> Array:
     return np.asarray(np.abs(np.where(slides, x - y, np.exp(1j * (x - y)) - 1.0)).max(axis=-1))
 
 
-def proposals(system: CarriedPlatform, most: int) -> Array:
+def propose_zeros(system: CarriedPlatform, most: int) -> Array:
     """Common zeros (k, n) that Newton's method finds from random complex starts, each with its conjugate."""
     rng, n = np.random.default_rng(0), len(system.freedoms_)
     starts = (rng.uniform(-np.pi, np.pi, (64, n)) + 3j * rng.normal(size=(64, n)) for _ in range(START_SETS_COUNT))
@@ -119,7 +119,7 @@ def solve_carried(measured: MeasuredRobot, goal: ClosedConfiguration, error: flo
         raise UnsupportedLocus(
             measured.setup.robot.name, "the distance to the exact closed configuration is not bounded"
         )
-    system = carried_platform(measured, goal, error)
+    system = build_carried_platform(measured, goal, error)
     (body,) = list_leg_ends(measured.setup.decomposition)
     return Model(system, lambda q: {body: system.pose(q)}, system.home), _judge(system)
 
@@ -137,7 +137,7 @@ def enclose_zeros(system: CarriedPlatform, proposed: Array) -> list[PoseBox]:
     return enclose_all(equations, map(system.unknowns, proposed))[0]
 
 
-def _far(system: CarriedPlatform, proposed: Array, known: Sequence[PoseBox]) -> list[PoseBox]:
+def _enclose_far(system: CarriedPlatform, proposed: Array, known: Sequence[PoseBox]) -> list[PoseBox]:
     """Boxes of the zeros, of the numbers as they are, at which a turn is far from real, apart from those known."""
     from flint import acb, ctx
 
@@ -180,16 +180,16 @@ def _judge(system: CarriedPlatform) -> SystemModes:
     if most > CLOSURES_MAX:
         raise ExternalSolverFailure("the leg", f"{size}: up to {most} solutions, too many (at most {CLOSURES_MAX})")
     why, bound = "degrees in each (Bézout)", "class"
-    boxes = enclose_zeros(system, proposals(system, most)) if n <= RANDOM_START_JOINTS_MAX else []
-    if len(boxes) < most and (counted := closings_bound(system, system.square)) is not None:
+    boxes = enclose_zeros(system, propose_zeros(system, most)) if n <= RANDOM_START_JOINTS_MAX else []
+    if len(boxes) < most and (counted := count_closures(system, system.square)) is not None:
         most, why, bound = counted.most, "ranks modulo a prime of 62 bits", "rank"
-        proposed = polish_zeros(system, [eigenvalues(system, system.square, counted)])
+        proposed = polish_zeros(system, [find_closures(system, system.square, counted)])
         boxes = enclose_zeros(system, proposed)
-        boxes += _far(system, proposed, boxes)
+        boxes += _enclose_far(system, proposed, boxes)
     at_goal = [box for box in boxes if box.real and box.has_pose(system.unknowns(system.home))]
     if len(boxes) != most or len(at_goal) != 1:
         raise ExternalSolverFailure("the leg", f"{size}: of {most} solutions at most ({why}) {len(boxes)} have boxes")
-    bodies = [_body(system, box) for box in boxes]
+    bodies = [_place_body(system, box) for box in boxes]
     if any(
         all((a - b).contains(0) for a, b in zip(one, other, strict=True))
         for k, one in enumerate(bodies)
@@ -202,18 +202,18 @@ def _judge(system: CarriedPlatform) -> SystemModes:
         kept = [
             box for box in real if box is at_goal[0] or not any(not each.value(box.box).contains(0) for each in besides)
         ]
-        modes = [as_mode(system, box, not besides or box is at_goal[0]) for box in kept]
+        modes = [make_mode(system, box, not besides or box is at_goal[0]) for box in kept]
     proof = (
         f"{size}: at most {most} solutions by {why}, {len(boxes)} enclosed, all distinct, complex ones "
         f"too{describe_far(boxes)}, {len(real)} real"
     )
     if not besides:
         return SystemModes(len(boxes), tuple(modes), True, proof, bound=bound, enclosed=True)
-    out = [as_mode(system, box, False) for box in real if box not in kept]
+    out = [make_mode(system, box, False) for box in real if box not in kept]
     return SystemModes.of_more(modes, out, f"from {n} of {len(system.told)} conditions: {proof}", bound)
 
 
-def _body(system: CarriedPlatform, box: PoseBox) -> list[Any]:
+def _place_body(system: CarriedPlatform, box: PoseBox) -> list[Any]:
     """The position and the three columns of the turn that carries the platform from the goal, in balls."""
     from flint import ctx
 
@@ -226,13 +226,13 @@ def _body(system: CarriedPlatform, box: PoseBox) -> list[Any]:
     return found
 
 
-def as_mode(system: CarriedPlatform, box: PoseBox, proved: bool, miss: float | None = None) -> SystemMode:
+def make_mode(system: CarriedPlatform, box: PoseBox, proved: bool, miss: float | None = None) -> SystemMode:
     """A real box as a mode, or as one that fits; ``miss``: how far it is from meeting all (sizes)."""
     n, x = len(system.freedoms_), box.middle.real
     q = np.array(
         [x[2 * n + k] if each.slides else np.arctan2(x[n + k], x[k]) for k, each in enumerate(system.freedoms_)]
     )
-    spread = [float(v.rad()) for v in _body(system, box)]
+    spread = [float(v.rad()) for v in _place_body(system, box)]
     shift, turn = system.size * float(np.linalg.norm(spread[:3])), 2.0 * float(np.linalg.norm(spread[3:]))
     if miss is None:
         values, slopes = system.values(q, system.told)

@@ -37,7 +37,7 @@ from ...tolerances import (
     RELATION_ANGLE_TOL,
 )
 from ..formation import Formation, Similarities, analyze_formation, list_sensed_points
-from ..loci.observation_loci import opposite
+from ..loci.observation_loci import list_opposite
 from ..observed import ObservedRobot
 
 Bodies = dict[str, Array]
@@ -68,7 +68,7 @@ class FormedModes:
     continuum: int | None = None
 
 
-def formation_modes(setup: ObservedRobot) -> FormedModes:
+def list_formation_modes(setup: ObservedRobot) -> FormedModes:
     """The modes of a formation with the measurements of its zero configuration."""
     at, observation_model = setup.all_samples.start, setup.samples.observation_model
     formation = analyze_formation(at, observation_model, compute_relation(at, observation_model), setup.decomposition)
@@ -193,8 +193,8 @@ class _SliderFormation:
         if spread > LOCUS_DISTANCE_TOL or abs(cuts[0]) <= NAMED_TWIST_TOL:
             return None
         at = ClosedConfiguration.of(self.at.model, self.at.model.integrate(self.at.q, cuts[0] * line))
-        bodies, _ = _nearest(at, self.at, self.question, group, tuple(goal.bodies))
-        reversed_ = opposite(self.question.observations, self.at, self.question.reference, at.pose)
+        bodies, _ = _move_nearest(at, self.at, self.question, group, tuple(goal.bodies))
+        reversed_ = list_opposite(self.question.observations, self.at, self.question.reference, at.pose)
         return [FormedMode(at, bodies, at.residual, reversed_)]
 
 
@@ -216,7 +216,7 @@ def _has_rank(rows: Array, slack: float, rank: int) -> bool:
     return True
 
 
-def _nearest(
+def _move_nearest(
     at: ClosedConfiguration,
     goal: ClosedConfiguration,
     observation_model: ObservationModel,
@@ -275,13 +275,13 @@ def _search(
             (
                 k
                 for k, mode in enumerate(modes)
-                if _nearest(there, mode.configuration, observation_model, group, formation.bodies)[1]
+                if _move_nearest(there, mode.configuration, observation_model, group, formation.bodies)[1]
                 <= RELATION_ANGLE_TOL
             ),
             None,
         )
         if known is None:
-            bodies, _ = _nearest(there, at, observation_model, group, formation.bodies)
+            bodies, _ = _move_nearest(there, at, observation_model, group, formation.bodies)
             modes.append(FormedMode(there, bodies, residual))
             met.append(1)
             quiet = 0

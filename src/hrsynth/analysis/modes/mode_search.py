@@ -91,7 +91,7 @@ def search(goal: ClosedConfiguration, observation_model: ObservationModel, bodie
         if has_unobserved_motion(goal, observation_model)
         else None
     )
-    found = [FoundMode(goal, _poses(goal, bodies), goal.residual, 1)] if own is None else []
+    found = [FoundMode(goal, _collect_poses(goal, bodies), goal.residual, 1)] if own is None else []
     motions = [] if own is None else [own]
     starts = closed = loose = quiet = 0
     near = list[FoundMode]()
@@ -110,7 +110,7 @@ def search(goal: ClosedConfiguration, observation_model: ObservationModel, bodie
             continue
         closed, quiet = closed + 1, quiet + 1
         at = ClosedConfiguration.of(model, model.remove_turns(q))
-        poses = _poses(at, bodies)
+        poses = _collect_poses(at, bodies)
         known = next(
             (
                 k
@@ -162,7 +162,7 @@ def _add_near(
     if left > CLOSURE_RESIDUAL_TOL:
         return
     at = ClosedConfiguration.of(model, model.remove_turns(q))
-    poses = _poses(at, bodies)
+    poses = _collect_poses(at, bodies)
     if all(bodies_apart(each.bodies, poses, observation_model, model.length) > NEAR_MODE_DISTANCE_MAX for each in near):
         near.append(FoundMode(at, poses, residual, 1))
 
@@ -174,5 +174,5 @@ def has_unobserved_motion(at: ClosedConfiguration, observation_model: Observatio
     return there.rank < there.dof.value or there.seen.weakest < NONZERO_SINGULAR_VALUE_MIN
 
 
-def _poses(at: ClosedConfiguration, bodies: Sequence[str]) -> dict[str, Array]:
+def _collect_poses(at: ClosedConfiguration, bodies: Sequence[str]) -> dict[str, Array]:
     return {body: at.pose(body) for body in bodies}

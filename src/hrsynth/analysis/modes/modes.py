@@ -25,7 +25,7 @@ from ...options import option
 from ...progress import report
 from ...records import FLAT, OPTIONAL, As, Shown, recorded
 from ...results import Result
-from ...solving.platform.solve import SystemModes, make_continuous_family
+from ...solving.platform.solve import SystemModes, make_family
 from ...tolerances import MEASUREMENT_BOUND, NEAR_POSE_DIFFERENCE_TOL
 from ..analysis_declaration import analysis
 from ..branch.joint_line import follow_line
@@ -36,15 +36,15 @@ from ..measured import MeasuredRobot
 from ..observation_inputs import POINTS, CameraLike, LegsLike, Seed, SensorLike
 from ..observed import ObservedRobot, RobotLike
 from ..setup_records import LIMITS_IGNORED
-from .assembly_mode import AssemblyMode, ModeReader, found_mode
+from .assembly_mode import AssemblyMode, ModeReader, build_mode
 from .branches import MODES_TIME_LIMIT_S, Model
 from .carrying_leg_modes import solve_carried
 from .condition_modes import PosedPlatform, solve_posed
-from .formation_modes import formation_modes
+from .formation_modes import list_formation_modes
 from .mode_search import FoundMode, has_unobserved_motion, search
 from .natural_modes import NaturalPlatform, prove_existence, solve_natural
-from .near_modes import NearMode, measurement_bound, near_modes, poses_alike
-from .tip_modes import may_count_more, solve_tips, without_couplings
+from .near_modes import NearMode, describe_poses_alike, find_near_modes, parse_measurement_bound
+from .tip_modes import drop_couplings, may_count_more, solve_tips
 
 WITHIN = {
     "formation": "configurations up to trivial motions",
@@ -180,7 +180,7 @@ class AssemblyModes(Result, shown_as="modes"):
     @property
     def alike(self) -> str:
         """Number of poses that a measurement with an error does not distinguish, as text."""
-        return poses_alike(self.modes, self.near_modes)
+        return describe_poses_alike(self.modes, self.near_modes)
 
     @property
     def count(self) -> str:
@@ -264,8 +264,7 @@ def modes(
     ] = None,
     real: Annotated[bool, option("Fix the real robot's own motors instead.")] = False,
     cone: Annotated[
-        float | str,
-        option("Measurement bound: poses that differ by no more are near modes; 0 for none.", "ANGLE"),
+        float | str, option("Measurement bound: poses that differ by no more are near modes; 0 for none.", "ANGLE")
     ] = MEASUREMENT_BOUND,
     as_written: bool = False,
     time_limit: Annotated[
@@ -333,13 +332,13 @@ def modes(
     if real and (observe not in (None, "all", ["all"]) or sensor is not None):
         given = "--observe" if sensor is None else "--sensor"
         raise BadRequest(f"--real: cannot be combined with {given}", remedy="Omit one.")
-    bound = measurement_bound(cone)
+    bound = parse_measurement_bound(cone)
     setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed, driven=real)
     if setup.robot.formation:
-        return _modes_of_formation(setup, at, real)
+        return _list_formation(setup, at, real)
     asked = None if at is None or isinstance(at, ClosedConfiguration) else parse_pose(at)
     if isinstance(asked, ModeNumber):
-        at, asked = at_mode(modes(setup), asked), None
+        at, asked = assemble_at_mode(modes(setup), asked), None
     elif isinstance(asked, JointPose):
         at, asked = follow_line(setup.all_samples.start, setup.motion, asked), None
     setup = setup if asked is None else setup.printing_like([asked])
@@ -350,7 +349,7 @@ def modes(
         goal = track_to_pose(goal, setup.all_samples.observation_model, asked, motion)
     measured = MeasuredRobot.of(setup, real)
     found = _list_modes(setup, measured, goal, wanted, real, as_written, time_limit)
-    near = near_modes(setup, goal, measured.observation_model, found.modes, found.candidates, bound)
+    near = find_near_modes(setup, goal, measured.observation_model, found.modes, found.candidates, bound)
     return replace(found, candidates=(), near_modes=near, measurement_bound=bound)
 
 
@@ -376,19 +375,19 @@ def _list_modes(
             kind,
             goal,
             pose,
-            make_continuous_family(f"{text}: a continuous family of dimension {free}", free),
+            make_family(f"{text}: a continuous family of dimension {free}", free),
             (),
             self_motions=() if own is None else (own,),
         )
     report("modes")
     try:
         if not as_written and _is_on_self_motion(setup, measured.observation_model, goal):
-            return _modes_by_search(
+            return _list_by_search(
                 setup, measured.observation_model, goal, pose, kind, "the pose lies on a self-motion"
             )
-        listed = _modes_by_system(setup, measured, goal, wanted, pose, kind, as_written, time_limit)
+        listed = _list_by_system(setup, measured, goal, wanted, pose, kind, as_written, time_limit)
     except (UnsupportedLocus, ExternalSolverFailure, TooLarge, MissingExtra) as error:
-        return _modes_by_search(setup, measured.observation_model, goal, pose, kind, error.reason)
+        return _list_by_search(setup, measured.observation_model, goal, pose, kind, error.reason)
     moving = (
         not listed.found.complete
         and not as_written
@@ -406,7 +405,7 @@ def _list_modes(
         if listed.found.continuous_family is not None
         else str(listed.found.singular_solutions)
     )
-    found = _modes_by_search(setup, measured.observation_model, goal, pose, kind, why)
+    found = _list_by_search(setup, measured.observation_model, goal, pose, kind, why)
     return (
         found
         if moving or not any(mode.proved for mode in listed.modes)
@@ -414,7 +413,7 @@ def _list_modes(
     )
 
 
-def _modes_of_formation(setup: ObservedRobot, where: object, real: bool) -> AssemblyModes:
+def _list_formation(setup: ObservedRobot, where: object, real: bool) -> AssemblyModes:
     """List the modes of a formation; poses and motors are refused, which are those of one platform."""
     if where is not None or real:
         raise BadRequest(
@@ -422,7 +421,7 @@ def _modes_of_formation(setup: ObservedRobot, where: object, real: bool) -> Asse
             remedy="Omit the option: the values at the file's configuration are fixed.",
         )
     report("modes")
-    found, goal = formation_modes(setup), setup.all_samples.start
+    found, goal = list_formation_modes(setup), setup.all_samples.start
     system = SystemModes(
         found.complex,
         (),
@@ -469,7 +468,7 @@ def _modes_of_formation(setup: ObservedRobot, where: object, real: bool) -> Asse
     )
 
 
-def at_mode(listed: AssemblyModes | None, asked: ModeNumber) -> ClosedConfiguration:
+def assemble_at_mode(listed: AssemblyModes | None, asked: ModeNumber) -> ClosedConfiguration:
     """Return the robot assembled at one of its modes, its coordinates relative to the zero configuration; raises
     ``BadRequest``, ``PoseReachFailure``."""
     assert listed is not None
@@ -505,7 +504,7 @@ def _is_on_self_motion(setup: ObservedRobot, observation_model: ObservationModel
     )
 
 
-def _modes_by_search(
+def _list_by_search(
     setup: ObservedRobot,
     observation_model: ObservationModel,
     goal: ClosedConfiguration,
@@ -539,10 +538,10 @@ def _modes_by_search(
 def _read_found(
     setup: ObservedRobot, observation_model: ObservationModel, mode: FoundMode, goal: bool = False
 ) -> AssemblyMode:
-    return found_mode(setup, observation_model, mode.configuration, mode.bodies, mode.residual, goal)
+    return build_mode(setup, observation_model, mode.configuration, mode.bodies, mode.residual, goal)
 
 
-def _modes_by_system(
+def _list_by_system(
     setup: ObservedRobot,
     measured: MeasuredRobot,
     goal: ClosedConfiguration,
@@ -557,7 +556,7 @@ def _modes_by_system(
     reasons = list[UnsupportedLocus | ExternalSolverFailure | TooLarge | MissingExtra]()
     answers = list[tuple[Model, SystemModes]]()
     exact = drift(goal, wanted, setup.normal.moved)
-    free = without_couplings(measured, goal)
+    free = drop_couplings(measured, goal)
     tips, asked, natural, narrower = (
         partial(solve_tips, as_written=as_written, time_limit=time_limit),
         partial(solve_posed, time_limit=time_limit),

@@ -16,14 +16,14 @@ from ...mechanism.observations.encoder import Encoder
 from ...mechanism.sensors import make_encoders
 from ...solving.platform.pose_conditions import AtAngle
 from ...solving.platform.solve import SystemModes
-from ..loci.observation_loci import all_loci
+from ..loci.observation_loci import derive_all_loci
 from ..measured import MeasuredRobot
 from ..observed import ObservedRobot
 from .branches import Model, solve_all
-from .condition_modes import PosedPlatform, most_posed, solve_posed
+from .condition_modes import PosedPlatform, bound_posed, solve_posed
 
 
-def without_couplings(
+def drop_couplings(
     measured: MeasuredRobot, goal: ClosedConfiguration
 ) -> tuple[MeasuredRobot, ClosedConfiguration] | None:
     """Return the robot without its couplings, at the same configuration, with its measured values fixed: so are joints
@@ -74,7 +74,7 @@ def solve_tips(
     measured: MeasuredRobot, goal: ClosedConfiguration, exact: float, as_written: bool, time_limit: float
 ) -> tuple[Model, SystemModes]:
     """All modes by where the tips of the legs can be, with the goal known to ``exact`` (m)."""
-    confined, seen = all_loci(measured, goal)
+    confined, seen = derive_all_loci(measured, goal)
     # a curve that was fitted to a leg's moves is not known to hold its exact tip
     fitted = confined.doubt is not None or any(tip.doubt is not None for tip in confined.tips)
     confined = replace(
@@ -88,11 +88,11 @@ def solve_tips(
     return solve_all(confined, time_limit=time_limit)
 
 
-def expected_modes(measured: MeasuredRobot, at: ClosedConfiguration) -> int:
+def bound_modes(measured: MeasuredRobot, at: ClosedConfiguration) -> int:
     """Return a root bound of the modes, complex ones too, from the degrees of the legs' conditions; the largest number
     if these are not known."""
     try:
-        return most_posed(measured, at)
+        return bound_posed(measured, at)
     except (UnsupportedLocus, ExternalSolverFailure):
         return sys.maxsize
 
@@ -103,7 +103,7 @@ def count_modes(measured: MeasuredRobot, at: ClosedConfiguration) -> SystemModes
     found = None
     if measured.generic_pattern.motion != "oriented":
         with suppress(UnsupportedLocus, ExternalSolverFailure, TooLarge, MissingExtra):
-            found = solve_all(all_loci(measured, at)[0], near=False)[1]
+            found = solve_all(derive_all_loci(measured, at)[0], near=False)[1]
     if found is not None and found.complete:
         return found
     try:

@@ -98,10 +98,8 @@ def _enclose_infinity(part: PoseSystem, balls: Within, far: Array, mark: Array) 
     assert own is not None
     rows = [np.append(mark @ half, 0.0) for half in (study[:4], study[4:])]
     quadrics = part.equations()
-    rounded = _build_equations([Quadric(each.A.astype(float)) for each in quadrics], own.A.astype(float), rows)
-    thick = _build_equations(
-        part.equations(balls), own.A, [np.array([acb(v) for v in row], dtype=object) for row in rows]
-    )
+    rounded = _build_nine([Quadric(each.A.astype(float)) for each in quadrics], own.A.astype(float), rows)
+    thick = _build_nine(part.equations(balls), own.A, [np.array([acb(v) for v in row], dtype=object) for row in rows])
     boxes: list[list[Any]] = []
     known: list[Array] = []
     for z in _polish(rounded, _place_starts(np.vstack([far, far.conj()]), mark, study)):
@@ -119,7 +117,7 @@ def _enclose_infinity(part: PoseSystem, balls: Within, far: Array, mark: Array) 
     return len(boxes)
 
 
-def _build_equations(quadrics: Sequence[Quadric], own: Any, rows: Sequence[Any]) -> list[Polynomial]:
+def _build_nine(quadrics: Sequence[Quadric], own: Any, rows: Sequence[Any]) -> list[Polynomial]:
     """The nine for quadrics of which the first is e·g, with the factor and the multiple fixed by rows (9,)."""
     first, *rest = (each.A for each in quadrics)
     return [FixedForm(rows[0], 1), FixedForm(rows[1], 0), FarPose(own, first), *map(FarCondition, rest)]

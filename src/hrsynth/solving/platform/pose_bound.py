@@ -33,7 +33,7 @@ QUATERNION_POWERS_MAX = 4
 PRIME = (1 << 62) - 57
 
 
-def compute_residues(values: Array) -> Any:
+def reduce_mod(values: Array) -> Any:
     """Floats as residues, exactly."""
     ratios = [float(v).as_integer_ratio() for v in np.ravel(values)]
     flat = np.array([n * pow(d, -1, PRIME) % PRIME for n, d in ratios], dtype=object)
@@ -69,24 +69,18 @@ def _sample_monomials(shape: tuple[int, int], t: int, at: int) -> Any:
 def _evaluate_conditions(forms: SquareForms, x: Any, others: Sequence[PoseCondition]) -> tuple[Any, list[Any]]:
     """w and conditions, as forms, at points x; shape (points,) each."""
     y, s = x[:, : forms.shape[0]], x[:, forms.shape[0] :]
-    q = y @ compute_residues(forms.poses.turns).T % PRIME
+    q = y @ reduce_mod(forms.poses.turns).T % PRIME
     w = np.sum(q * q, axis=1) % PRIME
     inverse = np.array([pow(int(v), -1, PRIME) for v in w], dtype=object)
     R = np.einsum("ikab,na,nb->nik", ROTATION.astype(int).astype(object), q, q) * inverse[:, None, None] % PRIME
     s = s * inverse[:, None] % PRIME
-    heights = [
-        (compute_residues(np.array(c.h)) - (R @ compute_residues(c.b)) @ compute_residues(c.n)) % PRIME
-        for c in forms.planes
-    ]
-    matrix = build_nmod(compute_residues(forms.system)).inv()
+    heights = [(reduce_mod(np.array(c.h)) - (R @ reduce_mod(c.b)) @ reduce_mod(c.n)) % PRIME for c in forms.planes]
+    matrix = build_nmod(reduce_mod(forms.system)).inv()
     solved = np.array([[int(v) for v in row] for row in matrix.table()], dtype=object)
-    p = np.column_stack([*heights, *s.T]) @ solved.T @ compute_residues(forms.poses.moves).T % PRIME
+    p = np.column_stack([*heights, *s.T]) @ solved.T @ reduce_mod(forms.poses.moves).T % PRIME
     found = []
     for c in others:
-        value = (
-            c.value((p + R @ compute_residues(c.b)) % PRIME, R @ compute_residues(c.c) % PRIME, compute_residues)
-            % PRIME
-        )
+        value = c.value((p + R @ reduce_mod(c.b)) % PRIME, R @ reduce_mod(c.c) % PRIME, reduce_mod) % PRIME
         for _ in range(c.degree):
             value = value * w % PRIME
         found.append(value)

@@ -56,7 +56,7 @@ class ProposedSolutions:
     far: Array | None = None
 
 
-def list_pose_systems(system: System, number: int = 0) -> Iterator[PoseSystem]:
+def list_parts(system: System, number: int = 0) -> Iterator[PoseSystem]:
     """Yield the choices of legs with just as many equations as dof, then those with too many."""
     chart = system.chart(number)
     for size in range(1, len(system.curves) + 1):

@@ -64,7 +64,7 @@ class WorkingFrame:
         return self.vector(p - self.origin)
 
 
-def choose_spatial_frame(curves: Sequence[Reach], size: float) -> WorkingFrame:
+def choose_frame(curves: Sequence[Reach], size: float) -> WorkingFrame:
     """A frame whose third axis is the direction that most share, circles first; size rounded to a power of 2."""
     directions = [curve.axis for curve in curves if isinstance(curve, Circle)]
     directions += [curve.direction for curve in curves if isinstance(curve, Line)]

@@ -27,8 +27,8 @@ from .quadrics import (
     WorkingFrame,
     build_distance,
     build_shifting,
+    choose_frame,
     choose_planar_frame,
-    choose_spatial_frame,
     convert_direction,
     put_on_circle,
     put_on_sphere,
@@ -248,7 +248,7 @@ class Spatial(System):
         curves = tuple(curve for k in legs if not isinstance(curve := self.curves[k], Surface))
         b = self.tips[list(legs)]
         unknowns = tuple(curve for curve in curves if not isinstance(curve, Point))
-        frame = choose_spatial_frame(curves, extent(curves, b))
+        frame = choose_frame(curves, extent(curves, b))
 
         def build(conics: Sequence[Conic], numbers: Numbers) -> list[Equation]:
             tips = [numbers.vector(tip / frame.size) for tip in b]

@@ -268,9 +268,7 @@ def _prove_doubles(rows: Sequence[_Condition], a: _Pair, b: _Pair) -> Iterator[_
     (o, n, first), (w, m, second) = _build_line(a, base), _build_line(b, platform)
     for sign, other in product((1, -1), repeat=2):
         # v = e₁ + i e₂, n = e₁ × e₂, but u = f₁ − i f₂, m = f₁ × f₂: R is a turn from (f₁, f₂, m) to (e₁, e₂, n)
-        found = _Double(
-            o, _make_isotropic(first, sign * n, 1), sign * n, w, _make_isotropic(second, other * m, -1), other * m
-        )
+        found = _Double(o, _combine(first, sign * n, 1), sign * n, w, _combine(second, other * m, -1), other * m)
         if found.is_isolated_solution(rows):
             yield found
 
@@ -283,7 +281,7 @@ def _build_line(names: _Pair, points: Sequence[Any]) -> tuple[Any, Any, Any]:
     return one, _normalise(along), _normalise(np.cross(along, across))
 
 
-def _make_isotropic(first: Any, n: Any, sign: int) -> Any:
+def _combine(first: Any, n: Any, sign: int) -> Any:
     """first ± i n × first."""
     from flint import acb
 

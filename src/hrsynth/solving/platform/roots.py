@@ -128,9 +128,7 @@ def solve_square(square: SquareSystem, balls: Within = Balls, farthest: float = 
             if _is_zero_to_rounding(eliminant.polynomial, other.polynomial):
                 zeros += 1
                 continue
-            found = _solve_eliminant(
-                _SquareEncloser(balls, equations, thick, square, turn, conics), order, eliminant, farthest
-            )
+            found = _solve(_SquareEncloser(balls, equations, thick, square, turn, conics), order, eliminant, farthest)
             if found.complete:
                 return replace(found, turn=turn)
             fallback = max(fallback, found, key=lambda each: each.complex)
@@ -176,9 +174,7 @@ def _is_zero_to_rounding(polynomial: fmpz_poly, noisy: fmpz_poly) -> bool:
     return not polynomial or compute_height(polynomial - noisy) * LOUD > compute_height(polynomial)
 
 
-def _solve_eliminant(
-    square: _SquareEncloser, order: tuple[int, ...], eliminant: Eliminant, farthest: float
-) -> SolutionSet:
+def _solve(square: _SquareEncloser, order: tuple[int, ...], eliminant: Eliminant, farthest: float) -> SolutionSet:
     """The solutions over the roots of an eliminant."""
     from flint import ctx, fmpz_poly
 

@@ -32,13 +32,7 @@ from .overdetermined import (
     may_be_goal,
     snap_centres,
 )
-from .pose_coordinate_solver import (
-    ProposedSolutions,
-    enclose_roots,
-    list_pose_systems,
-    propose_by_msolve,
-    propose_roots,
-)
+from .pose_coordinate_solver import ProposedSolutions, enclose_roots, list_parts, propose_by_msolve, propose_roots
 from .quadrics import PoseSystem
 from .root_bound import Bound, find_least_bound
 from .roots import DOUBLE_SOLUTION_DISTANCE_TOL, RealSolution, SolutionSet, has_nearly_double_solution, solve_square
@@ -210,7 +204,7 @@ def _propose(
     if system.missing:
         return _report_too_few(system)
     part = None
-    for part in islice(list_pose_systems(system), LEG_CHOICES_SOLVED_MAX):
+    for part in islice(list_parts(system), LEG_CHOICES_SOLVED_MAX):
         most = find_least_bound(system, part.legs)
         roots = None
         for number in range(POSE_CHARTS_TRIED_MAX):
@@ -230,7 +224,7 @@ def _propose(
 
 
 def _report_too_few(system: System) -> SystemModes:
-    return make_continuous_family(f"too few legs: a continuous family of dimension {system.missing}", system.missing)
+    return make_family(f"too few legs: a continuous family of dimension {system.missing}", system.missing)
 
 
 def _report_undecided(system: System, tried: bool, goal: Array | None, near: bool) -> SystemModes:
@@ -265,12 +259,10 @@ def _report_undecided(system: System, tried: bool, goal: Array | None, near: boo
             singular_solutions="the equations depend on each other, but no continuous family of poses was found",
             open=True,
         )
-    return replace(
-        make_continuous_family(f"the tips can move together: a continuous family of dimension {size}", size), open=True
-    )
+    return replace(make_family(f"the tips can move together: a continuous family of dimension {size}", size), open=True)
 
 
-def make_continuous_family(text: str, size: int) -> SystemModes:
+def make_family(text: str, size: int) -> SystemModes:
     """Return modes that form a continuous family of this dimension."""
     return SystemModes(
         0, (), False, "a continuous family is not counted", singular_solutions=text, continuous_family=size

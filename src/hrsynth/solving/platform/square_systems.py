@@ -18,7 +18,7 @@ from .quadrics import (
     RoundedConic,
     WorkingFrame,
     build_conic,
-    choose_spatial_frame,
+    choose_frame,
     convert_direction,
     put_on_plane,
     put_on_sphere,
@@ -82,7 +82,7 @@ def build_three_surfaces(legs: Sequence[tuple[int, Surface]], whole: bool) -> tu
     the surfaces have no point in common, or a curve of them."""
     first, second, last = _sort_surfaces([surface for _, surface in legs])
     all_three = (first, second, last)
-    frame = choose_spatial_frame(all_three, extent(all_three, np.zeros((1, 3))))
+    frame = choose_frame(all_three, extent(all_three, np.zeros((1, 3))))
     one, two = (_find_normal(surface, last) for surface in (first, second))
     along = cross(one, two)
     sine = length(along)

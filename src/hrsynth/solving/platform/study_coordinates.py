@@ -16,7 +16,7 @@ from ...geometry.loci import Reach
 from ...geometry.so3 import convert_from_quaternion, convert_rotations_to_vectors
 from ...geometry.vectors import Array, cross
 from .polynomials import Quadric
-from .quadrics import UNIT, MovingPoint, Numbers, PoseParametrization, choose_spatial_frame
+from .quadrics import UNIT, MovingPoint, Numbers, PoseParametrization, choose_frame
 
 STUDY_UNKNOWNS_COUNT = 7
 """Unknowns: three of the quaternion, four of g."""
@@ -26,7 +26,7 @@ def build_study_chart(
     reaches: tuple[Reach, ...], b: Array, size: float, number: int, arrows: int, hub: Array
 ) -> PoseParametrization:
     """The chart of a number for tips b (n, 3), the last of them arrows from a hub (3,)."""
-    frame = choose_spatial_frame(reaches, size)
+    frame = choose_frame(reaches, size)
     E = _draw_quaternions(number)
     e, g = E, np.eye(8, dtype=int).astype(object)[4:]
     w = sum(_expand(v, v) for v in e)

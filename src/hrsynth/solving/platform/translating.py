@@ -24,7 +24,7 @@ from .quadrics import (
     PoseParametrization,
     build_shifting,
     build_spokes,
-    choose_spatial_frame,
+    choose_frame,
     convert_direction,
     list_normals,
     put_on_circle,
@@ -64,7 +64,7 @@ class TranslatingPlatform(TranslatingBodies):
 
     def chart(self, number: int) -> PoseParametrization:
         """The position."""
-        frame = choose_spatial_frame(self.paths, self.size)
+        frame = choose_frame(self.paths, self.size)
 
         def tips(numbers: Numbers) -> list[MovingPoint]:
             return [build_shifting(3, numbers.vector(np.zeros(3)))] * len(self.paths)
@@ -103,7 +103,7 @@ class TranslatingPlatform(TranslatingBodies):
     def _on_curve(self, legs: tuple[int, int], one: Curve, other: Reach, whole: bool) -> SquareSystem:
         """The curve's points at which the other is met."""
         both = (one, other)
-        frame = choose_spatial_frame(both, extent(both, np.zeros((1, 3))))
+        frame = choose_frame(both, extent(both, np.zeros((1, 3))))
 
         def build(conics: Sequence[Conic], numbers: Numbers) -> list[Equation]:
             centre = numbers.vector(frame.point(other.centre))
@@ -191,8 +191,8 @@ class ArticulatedPlatform(TranslatingBodies):
 
     def chart(self, number: int) -> PoseParametrization:
         """p, cos θ and sin θ, or s."""
-        middle = choose_spatial_frame(self.paths, self.size).origin
-        frame = replace(choose_spatial_frame((*self.paths, self.slide), self.size), origin=middle)
+        middle = choose_frame(self.paths, self.size).origin
+        frame = replace(choose_frame((*self.paths, self.slide), self.size), origin=middle)
 
         count = 5 if isinstance(self.slide, Circle) else 4
 
@@ -237,7 +237,7 @@ class ArticulatedPlatform(TranslatingBodies):
         size = max(extent((first, onto), np.zeros((1, 3))), self._radius, length(self.slide.centre))
         middle = (first.centre + onto.centre) / 2
         start, end = shift_reach(first, -middle), shift_reach(onto, -middle)
-        frame = replace(choose_spatial_frame((start, end, self.slide), size), origin=np.zeros(3))
+        frame = replace(choose_frame((start, end, self.slide), size), origin=np.zeros(3))
         resting = isinstance(first, Point)
 
         def build(conics: Sequence[Conic], numbers: Numbers) -> list[Equation]:
