@@ -85,29 +85,29 @@ def find_endpoints(
     quadrics of e are left, and eight paths.
     """
     back = np.linalg.inv(study)
-    wanted = np.array([back.T @ np.asarray(each.A, dtype=float) @ back for each in quadrics])
+    wanted = np.array([back.T @ np.asarray(quadric.A, dtype=float) @ back for quadric in quadrics])
     wanted = wanted + wanted.transpose(0, 2, 1)
     wanted = wanted / np.abs(wanted).max(axis=(1, 2))[:, None, None]
     lift = np.vstack([np.eye(4), _solve_turning(wanted[[0, *resting]])]) if resting else np.eye(8)
     to = lift.T @ np.delete(wanted, [0, *resting] if resting else [], axis=0) @ lift
     start, x = _build_corners() if resting else _start()
-    found = _UnitEndpoints()
+    ends = _UnitEndpoints()
     for number in range(HOMOTOPY_ROUNDS_MAX):
         with np.errstate(all="ignore"):
             at = _normalise(_follow_paths(start * np.exp(1j * (1.2 + 2.0 * number)), to, x) @ lift.T)
-            found = _sort_ends(wanted, at, found.sharp)
-        if not found.lost or len(found.sharp) >= (enough or len(x)):
+            ends = _sort_ends(wanted, at, ends.sharp)
+        if not ends.lost or len(ends.sharp) >= (enough or len(x)):
             break
-    at = np.array([*found.sharp, *found.singular]).reshape(-1, 8) @ back.T
-    multiple = (1,) * len(found.sharp) + found.multiple
-    far = np.reshape(found.far, (-1, 8))
-    return PathEndpoints(at[:, 1:] / at[:, :1], multiple, len(far), found.lost, found.loose, far)
+    at = np.array([*ends.sharp, *ends.singular]).reshape(-1, 8) @ back.T
+    multiple = (1,) * len(ends.sharp) + ends.multiple
+    far = np.reshape(ends.far, (-1, 8))
+    return PathEndpoints(at[:, 1:] / at[:, :1], multiple, len(far), ends.lost, ends.loose, far)
 
 
 def _build_corners() -> tuple[Array, Array]:
     """Three quadrics of e, shape (3, 4, 4), and their eight solutions (8, 4): eₖ² = cₖ² e₀²."""
-    c, one = np.exp(1j * np.arange(4)), np.eye(4)
-    start = np.array([np.diag(one[k] - c[k] ** 2 * one[0]) for k in range(1, 4)])
+    c, unit = np.exp(1j * np.arange(4)), np.eye(4)
+    start = np.array([np.diag(unit[k] - c[k] ** 2 * unit[0]) for k in range(1, 4)])
     return start, _normalise(np.array([c * signs for signs in product((1.0,), *[(1.0, -1.0)] * 3)]))
 
 
@@ -185,10 +185,10 @@ def _sort_ends(wanted: Array, x: Array, known: Sequence[Array]) -> _UnitEndpoint
         & (_compute_distance(vague) < SOLUTION_DISTANCE_MAX)
     ]
     groups: list[list[Array]] = []
-    for each in vague:
-        group = next((group for group in groups if _compare_lines(each, group[0]) < SINGULAR_ENDPOINT_DISTANCE_TOL), [])
+    for end in vague:
+        group = next((group for group in groups if _compare_lines(end, group[0]) < SINGULAR_ENDPOINT_DISTANCE_TOL), [])
         groups += [] if group else [group]
-        group.append(each)
+        group.append(end)
     several = [group for group in groups if len(group) > 1]
     multiple = tuple(len(group) for group in several)
     far = left[infinite]
@@ -199,11 +199,11 @@ def _sort_ends(wanted: Array, x: Array, known: Sequence[Array]) -> _UnitEndpoint
 
 def _add_conjugates(x: Sequence[Array]) -> list[Array]:
     """Distinct vectors up to factors, each with its conjugate; real ones without imaginary parts."""
-    found: list[Array] = []
-    for each in map(_turn_real, x):
-        if all(_compare_lines(each, other) > ENDPOINT_DISTANCE_TOL for other in found):
-            found += [each] if np.isrealobj(each) else [each, each.conj()]
-    return found
+    distinct: list[Array] = []
+    for vector in map(_turn_real, x):
+        if all(_compare_lines(vector, known) > ENDPOINT_DISTANCE_TOL for known in distinct):
+            distinct += [vector] if np.isrealobj(vector) else [vector, vector.conj()]
+    return distinct
 
 
 def _turn_real(x: Array, flat: float = ENDPOINT_DISTANCE_TOL) -> Array:
@@ -213,9 +213,9 @@ def _turn_real(x: Array, flat: float = ENDPOINT_DISTANCE_TOL) -> Array:
     return x.real if np.abs(x.imag).max() < flat else x
 
 
-def _compare_lines(one: Array, other: Array) -> float:
+def _compare_lines(u: Array, v: Array) -> float:
     """Return the difference of two unit vectors, up to factors."""
-    return float(np.linalg.norm(one - other * np.vdot(other, one)))
+    return float(np.linalg.norm(u - v * np.vdot(v, u)))
 
 
 def _compute_distance(x: Array) -> Array:

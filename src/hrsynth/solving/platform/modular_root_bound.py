@@ -29,7 +29,7 @@ Form = dict[tuple[int, ...], Any]
 
 def bound_zeros(quadrics: Sequence[Quadric], enough: int) -> int | None:
     """The least bound that is found, the first that is ``enough``; None where none is."""
-    forms, n = [_read_form(each) for each in quadrics], len(quadrics[0].A) - 1
+    forms, n = [_read_form(quadric) for quadric in quadrics], len(quadrics[0].A) - 1
     left = list(range(n))
     while (line := _find_line(forms := _reduce_forms(forms))) is not None:
         k = max((k for k in left if _get_slope(line, k)), key=lambda k: abs(_get_slope(line, k)), default=None)
@@ -45,7 +45,7 @@ def bound_zeros(quadrics: Sequence[Quadric], enough: int) -> int | None:
     ]
     best: int | None = None
     for groups in list_partitions(list(range(len(left)))):
-        best = min((each for each in (best, _find_least_bound(flat, groups, enough)) if each is not None), default=None)
+        best = min((b for b in (best, _find_least_bound(flat, groups, enough)) if b is not None), default=None)
         if best is not None and best <= enough:
             break
     return best if left else 1
@@ -53,24 +53,24 @@ def bound_zeros(quadrics: Sequence[Quadric], enough: int) -> int | None:
 
 def combine_quadrics(quadrics: Sequence[Quadric]) -> list[Quadric]:
     """Return the same span of quadrics, as many as can be without their quadratic parts."""
-    n, found = len(quadrics[0].A) - 1, []
-    for form in _reduce_forms([_read_form(each) for each in quadrics]):
+    n, combined = len(quadrics[0].A) - 1, []
+    for form in _reduce_forms([_read_form(quadric) for quadric in quadrics]):
         A, common = np.zeros((n + 1, n + 1), dtype=object), math.lcm(*(c.denominator for c in form.values()))
         for e, c in form.items():
             i, j = sorted([0, 0, *(k + 1 for k in range(n) for _ in range(e[k]))])[-2:]
             A[i, j] = int(c * common)
-        found.append(Quadric(A))
-    return found
+        combined.append(Quadric(A))
+    return combined
 
 
 def _read_form(quadric: Quadric) -> Form:
-    n, found = len(quadric.A) - 1, Form()
+    n, form = len(quadric.A) - 1, Form()
     for i in range(n + 1):
         for j in range(n + 1):
             if quadric.A[i, j]:
                 e = tuple(int(k + 1 == i) + int(k + 1 == j) for k in range(n))
-                found[e] = found.get(e, Fraction(0)) + Fraction(int(quadric.A[i, j]))
-    return {e: c for e, c in found.items() if c}
+                form[e] = form.get(e, Fraction(0)) + Fraction(int(quadric.A[i, j]))
+    return {e: c for e, c in form.items() if c}
 
 
 def _get_slope(line: Form, k: int) -> Any:
@@ -80,19 +80,19 @@ def _get_slope(line: Form, k: int) -> Any:
 
 def _reduce_forms(forms: Sequence[Form]) -> list[Form]:
     """Return the same span, quadratic monomials eliminated first."""
-    rows, found = [dict(form) for form in forms], list[Form]()
+    rows, reduced = [dict(form) for form in forms], list[Form]()
     columns = sorted({e for form in forms for e in form}, key=lambda e: (-sum(e), [-k for k in e]))
     for e in columns:
         pivot = next((row for row in rows if row.get(e)), None)
         if pivot is None:
             continue
         rows = [_subtract(row, pivot, row.get(e, 0) / pivot[e]) for row in rows if row is not pivot]
-        found.append(pivot)
-    return found
+        reduced.append(pivot)
+    return reduced
 
 
-def _subtract(row: Form, other: Form, factor: Any) -> Form:
-    total = {e: row.get(e, 0) - factor * other.get(e, 0) for e in row.keys() | other.keys()}
+def _subtract(row: Form, second: Form, factor: Any) -> Form:
+    total = {e: row.get(e, 0) - factor * second.get(e, 0) for e in row.keys() | second.keys()}
     return {e: c for e, c in total.items() if c}
 
 
@@ -113,10 +113,10 @@ def _eliminate(form: Form, line: Form, k: int) -> Form:
     return total
 
 
-def _expand_product(one: Form, other: Form) -> Form:
+def _expand_product(first: Form, second: Form) -> Form:
     total = Form()
-    for e, c in one.items():
-        total = _subtract(total, {tuple(map(sum, zip(e, f, strict=True))): c * d for f, d in other.items()}, -1)
+    for e, c in first.items():
+        total = _subtract(total, {tuple(map(sum, zip(e, f, strict=True))): c * d for f, d in second.items()}, -1)
     return total
 
 
@@ -135,7 +135,7 @@ def _find_least_bound(forms: Sequence[Form], groups: Sequence[Sequence[int]], en
     """The least bound with some groups."""
     from flint import nmod_mat
 
-    found = None
+    least = None
     for caps in sorted(product(range(2, CAP_OF_MULTIPLES + 1), repeat=len(groups)), key=sum):
         if (
             math.prod(math.comb(len(group) + cap, cap) for group, cap in zip(groups, caps, strict=True))
@@ -157,8 +157,8 @@ def _find_least_bound(forms: Sequence[Form], groups: Sequence[Sequence[int]], en
         if not rows or nmod_mat([row[:edge] for row in rows], PRIME).rank() < edge:
             continue
         bound = len(columns) - int(nmod_mat(rows, PRIME).rank())
-        if found is None or bound < found:
-            found = bound
+        if least is None or bound < least:
+            least = bound
         if bound <= enough:
             break
-    return found
+    return least

@@ -44,8 +44,8 @@ def bound_tip_error(system: System, k: int, at: Array, shift: float, turn: float
 def may_be_goal(system: System, q: Array, goal: Array, shift: float, turn: float) -> bool:
     """Return True if the exact pose about ``q`` can be that about ``goal``: all its tips can."""
     return all(
-        length(one - other) <= bound_tip_error(system, k, one, shift, turn) + bound_tip_rounding(system, other)
-        for k, (one, other) in enumerate(zip(system.tips_at(q), system.tips_at(goal), strict=True))
+        length(tip - goal_tip) <= bound_tip_error(system, k, tip, shift, turn) + bound_tip_rounding(system, goal_tip)
+        for k, (tip, goal_tip) in enumerate(zip(system.tips_at(q), system.tips_at(goal), strict=True))
     )
 
 
@@ -85,7 +85,7 @@ def is_beyond_rigid_platform(system: System, places: Mapping[int, tuple[Array, f
             for k, (at, miss) in places.items()
         }
         arms = [(at - to, b - c) for (at, b), (to, c) in combinations(tips.values(), 2)]
-        return any(not (arm @ arm - own @ own).contains(0) for arm, own in arms)
+        return any(not (arm @ arm - side @ side).contains(0) for arm, side in arms)
 
 
 def describe_fits(goal: bool, lost: bool, fitting: Sequence[float], out: int, open_: int) -> str:
@@ -114,7 +114,7 @@ def compute_residual(system: System, q: Array) -> float:
 
 def find_stationary(system: System, starts: Sequence[Array], known: Sequence[Array]) -> list[Array]:
     """Poses with a small residual that is stationary, nearest to ``starts``, without those ``known``, best first."""
-    found: list[tuple[float, Array]] = []
+    ranked: list[tuple[float, Array]] = []
     seen = [np.asarray(q) for q in known]
     for start in starts:
         if compute_residual(system, start) > NEAR_MODE_START_MISS_MAX:
@@ -122,23 +122,23 @@ def find_stationary(system: System, starts: Sequence[Array], known: Sequence[Arr
         q = _fit_pose(system, start)
         miss = compute_residual(system, q)
         if miss <= NEAR_MODE_DISTANCE_MAX and all(
-            _compare_poses(system, q, other) > NEAR_MODE_DIFFERENCE_TOL for other in seen
+            _compare_poses(system, q, pose) > NEAR_MODE_DIFFERENCE_TOL for pose in seen
         ):
-            found.append((miss, q))
+            ranked.append((miss, q))
             seen.append(q)
-    return [q for _, q in sorted(found, key=lambda each: each[0])]
+    return [q for _, q in sorted(ranked, key=lambda item: item[0])]
 
 
 def find_dimension(system: System) -> int | None:
     """Return the largest dimension of the real poses about one that closes; None if none is found."""
     rng = np.random.default_rng(0)
-    found = []
+    dimensions = []
     for _ in range(CONTINUOUS_FAMILY_STARTS_COUNT):
         q = _fit_pose(system, system.somewhere(rng))
         if compute_residual(system, q) <= LOCUS_DISTANCE_TOL:
             values = np.linalg.svd(_compute_slopes(system, q), compute_uv=False)
-            found.append(int(len(q) - np.sum(values > np.sqrt(LOCUS_EXTENT_TOL) * values[0])))
-    return max(found, default=None)
+            dimensions.append(int(len(q) - np.sum(values > np.sqrt(LOCUS_EXTENT_TOL) * values[0])))
+    return max(dimensions, default=None)
 
 
 def _fit_pose(system: System, start: Array) -> Array:
@@ -155,12 +155,12 @@ def _compute_slopes(system: System, q: Array, step: float = 1e-6) -> Array:
     return np.column_stack(columns)
 
 
-def _compare_poses(system: System, one: Array, other: Array) -> float:
+def _compare_poses(system: System, q: Array, p: Array) -> float:
     """Return the difference of two poses, or of the tips of two bodies (sizes, pure numbers)."""
-    X, Y = system.pose(one), system.pose(other)
-    moved = (X[:3, 3] - Y[:3, 3], system.misses(one) - system.misses(other))
+    X, Y = system.pose(q), system.pose(p)
+    moved = (X[:3, 3] - Y[:3, 3], system.misses(q) - system.misses(p))
     turned = float(np.abs(X[:3, :3] - Y[:3, :3]).max())
-    return max(max(float(np.abs(each).max()) for each in moved) / system.size, turned)
+    return max(max(float(np.abs(difference).max()) for difference in moved) / system.size, turned)
 
 
 @dataclass(frozen=True)
@@ -187,28 +187,28 @@ def snap_centres(system: System) -> tuple[System, tuple[SnappedPoints, ...]]:
         for where, at in points.items()
         for i, j in combinations(at, 2)
     ]
-    accepted = [each for each in apart if each[0] <= SNAP_DISTANCE_MAX * system.size]
-    largest = max((each[0] for each in accepted), default=0.0)
-    smallest = min((each[0] for each in apart if each not in accepted), default=np.inf)
+    accepted = [pair for pair in apart if pair[0] <= SNAP_DISTANCE_MAX * system.size]
+    largest = max((pair[0] for pair in accepted), default=0.0)
+    smallest = min((pair[0] for pair in apart if pair not in accepted), default=np.inf)
     if largest * RANK_GAP_MIN > smallest:
         raise GeometryAmbiguous(
             "joint centres that may coincide", largest / system.size, smallest / system.size, RANK_GAP_MIN
         )
     if largest == 0.0:
         return system, ()
-    tips, curves, told = system.tips.copy(), list(system.curves), []
+    tips, curves, snapped = system.tips.copy(), list(system.curves), []
     for where, at in points.items():
         for group in _join_pairs([(i, j) for _, side, i, j in accepted if side == where]):
             middle = np.mean([at[k] for k in group], axis=0)
             defect = max(d for d, side, i, _ in accepted if side == where and i in group)
             if defect > 0:
-                told.append(SnappedPoints(where, group, defect))
+                snapped.append(SnappedPoints(where, group, defect))
             for k in group:
                 if where == "platform":
                     tips[k] = middle
                 else:
                     curves[k] = replace(curves[k], centre=middle)
-    return replace(system, tips=tips, curves=tuple(curves), error=system.error + largest), tuple(told)
+    return replace(system, tips=tips, curves=tuple(curves), error=system.error + largest), tuple(snapped)
 
 
 def _join_pairs(pairs: list[tuple[int, int]]) -> list[tuple[int, ...]]:

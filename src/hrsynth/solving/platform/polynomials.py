@@ -103,7 +103,7 @@ def pair(f: Table, g: Table) -> Eliminant:
         last = [p(x) for p in b]
         return None if ys is None else [(y,) for y in ys if (last[0] + y * (last[1] + y * last[2])).contains(0)]
 
-    bound = 2 * sum(max((p.degree() for p in each), default=0) for each in (a, b))
+    bound = 2 * sum(max((p.degree() for p in coefficients), default=0) for coefficients in (a, b))
     return Eliminant(low * low - top * mixed, bound, others, several)
 
 

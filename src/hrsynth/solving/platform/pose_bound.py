@@ -54,8 +54,8 @@ def _evaluate_monomials(x: Any, exponents: Array) -> Any:
     by = {(): x[:, 0] * 0 + 1}
     for i in range(x.shape[1]):
         by = {
-            each: by[each[:-1]] * powers[each[-1]][i] % PRIME if each[-1] else by[each[:-1]]
-            for each in dict.fromkeys(map(tuple, exponents[:, : i + 1].tolist()))
+            e: by[e[:-1]] * powers[e[-1]][i] % PRIME if e[-1] else by[e[:-1]]
+            for e in dict.fromkeys(map(tuple, exponents[:, : i + 1].tolist()))
         }
     return np.array(list(by.values()), dtype=object).reshape(-1, len(x))
 
@@ -78,13 +78,13 @@ def _evaluate_conditions(forms: SquareForms, x: Any, others: Sequence[PoseCondit
     matrix = build_nmod(reduce_mod(forms.system)).inv()
     solved = np.array([[int(v) for v in row] for row in matrix.table()], dtype=object)
     p = np.column_stack([*heights, *s.T]) @ solved.T @ reduce_mod(forms.poses.moves).T % PRIME
-    found = []
+    values = []
     for c in others:
         value = c.value((p + R @ reduce_mod(c.b)) % PRIME, R @ reduce_mod(c.c) % PRIME, reduce_mod) % PRIME
         for _ in range(c.degree):
             value = value * w % PRIME
-        found.append(value)
-    return w, found
+        values.append(value)
+    return w, values
 
 
 def build_nmod(rows: Any) -> Any:
@@ -107,23 +107,23 @@ class _Quotient:
     def of(cls, forms: SquareForms, t: int) -> _Quotient | None:
         """Return the forms modulo the first condition, for degrees up to t; None if it gives no unknown, or if points
         do not separate the forms."""
-        (a, m), one = forms.shape, forms.others[0]
-        if one.degree > 1 or len(forms.others) < 2:
+        (a, m), condition = forms.shape, forms.others[0]
+        if condition.degree > 1 or len(forms.others) < 2:
             return None
         for place in (*range(a, a + m), *range(a)):
             power = 1 if place >= a else 2
             kept = list_exponents(forms.shape, t)
             kept = kept[kept[:, place] < power]
-            x, found = _sample_residues(forms.shape, len(kept) if power == 1 else 3 * len(kept) + 20), list[Any]()
-            c, b, d = _fit_parabola(forms, x, place, one)
+            x, parts = _sample_residues(forms.shape, len(kept) if power == 1 else 3 * len(kept) + 20), list[Any]()
+            c, b, d = _fit_parabola(forms, x, place, condition)
             if not c[0] if power == 2 else not b[0]:
                 continue
             for row, *of in zip(x, c, b, d, strict=True):
                 if (root := _find_root(*map(int, of))) is not None:
-                    found.append([*row[:place], root, *row[place + 1 :]])
-            points = np.array(found[: len(kept)], dtype=object).reshape(-1, a + m)
-            told = len(points) == len(kept) and build_nmod(_evaluate_monomials(points, kept)).rank() == len(kept)
-            return cls(place, power, points) if told else None
+                    parts.append([*row[:place], root, *row[place + 1 :]])
+            points = np.array(parts[: len(kept)], dtype=object).reshape(-1, a + m)
+            full = len(points) == len(kept) and build_nmod(_evaluate_monomials(points, kept)).rank() == len(kept)
+            return cls(place, power, points) if full else None
         return None
 
     def values(self, forms: SquareForms, t: int) -> Any:
@@ -132,10 +132,10 @@ class _Quotient:
         return _evaluate_monomials(self.points, every[every[:, self.place] < self.power])
 
 
-def _fit_parabola(forms: SquareForms, x: Any, place: int, one: PoseCondition) -> tuple[Any, Any, Any]:
+def _fit_parabola(forms: SquareForms, x: Any, place: int, condition: PoseCondition) -> tuple[Any, Any, Any]:
     """c, b, d of a condition c v² + b v + d of degree 2 in an unknown v, the others as they are at points."""
     d, plus, minus = (
-        _evaluate_conditions(forms, np.hstack([x[:, :place], x[:, :1] * 0 + v, x[:, place + 1 :]]), [one])[1][0]
+        _evaluate_conditions(forms, np.hstack([x[:, :place], x[:, :1] * 0 + v, x[:, place + 1 :]]), [condition])[1][0]
         for v in (0, 1, PRIME - 1)
     )
     half = (PRIME + 1) // 2
@@ -161,8 +161,8 @@ def compute_dimensions(forms: SquareForms, t: int, most: int) -> list[int]:
     def values(degree: int) -> Any:
         return _sample_monomials(forms.shape, degree, t) if quotient is None else quotient.values(forms, degree)
 
-    w, found = _evaluate_conditions(forms, points, others)
-    rows = [values(t - 2 * c.degree) * value % PRIME for c, value in zip(others, found, strict=True)]
+    w, conditions = _evaluate_conditions(forms, points, others)
+    rows = [values(t - 2 * c.degree) * value % PRIME for c, value in zip(others, conditions, strict=True)]
     # what vanishes on I_t, on which wᵏ S has the rank that it has modulo I_t
     kernel, size = build_nmod(np.vstack(rows)).nullspace()
     columns = np.array([[int(v) for v in row[:size]] for row in kernel.table()], dtype=object)
@@ -178,9 +178,9 @@ def bound(forms: SquareForms) -> tuple[int, int, int] | None:
     t = forms.degree
     while forms.others and len(list_exponents(forms.shape, t)) <= LARGEST_FORMS:
         most = min(QUATERNION_POWERS_MAX, t // 2 - 1)
-        found = compute_dimensions(forms, t, most)
-        for k, (one, next_) in enumerate(pairwise(found), 1):
-            if one == next_:
-                return one, t, k
+        dimensions = compute_dimensions(forms, t, most)
+        for k, (dimension, next_) in enumerate(pairwise(dimensions), 1):
+            if dimension == next_:
+                return dimension, t, k
         t += 2
     return None

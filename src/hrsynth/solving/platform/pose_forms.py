@@ -122,11 +122,11 @@ class SquareForms:
             planes.append(plane)
         rows = np.array([poses.rates(c) for c in planes]).reshape(-1, poses.freedoms)
         others = list[PoseCondition]()
-        for each in sorted(rest, key=lambda c: c.degree):
-            rate = poses.rates(each)
+        for condition in sorted(rest, key=lambda c: c.degree):
+            rate = poses.rates(condition)
             more = np.vstack([rows, rate / max(float(np.linalg.norm(rate)), INDEPENDENT_RATES_MIN)])
             if len(rows) < poses.freedoms and np.linalg.svd(more, compute_uv=False)[-1] > INDEPENDENT_RATES_MIN:
-                rows, others = more, [*others, each]
+                rows, others = more, [*others, condition]
         if len(rows) < poses.freedoms:
             return None
         free = np.linalg.svd(np.vstack([basis, np.zeros((1, basis.shape[1]))]))[2][len(planes) :].T
@@ -179,14 +179,14 @@ class SquareForms:
 def list_exponents(shape: tuple[int, int], t: int) -> Array:
     """The exponents of q and s in the monomials of a degree; shape (n, a + m)."""
     a, m = shape
-    found = [
+    exponents = [
         (*first, r - sum(first), *s)
         for s in product(range(t // 2 + 1), repeat=m)
         if (r := t - 2 * sum(s)) >= 0
         for first in product(range(r + 1), repeat=a - 1)
         if sum(first) <= r
     ]
-    return np.array(found, dtype=int).reshape(-1, a + m)
+    return np.array(exponents, dtype=int).reshape(-1, a + m)
 
 
 @lru_cache(maxsize=16)
@@ -213,7 +213,7 @@ def _build_products(shape: tuple[int, int], t: int, count: int, what: str) -> Ar
     y, s = _sample_points(shape, count)
     by = {"y": y.T, "s": s.T, "w": np.ones((1, count))}[what]
     high, low = _build_basis(shape, t, count), _build_basis(shape, t - (1 if what == "y" else 2), count)
-    return np.array([(low * each[:, None]).T @ high for each in by]).reshape(-1, low.shape[1], high.shape[1])
+    return np.array([(low * factor[:, None]).T @ high for factor in by]).reshape(-1, low.shape[1], high.shape[1])
 
 
 def propose_poses(forms: SquareForms, t: int, number: int, k: int) -> tuple[Array, Array] | None:
@@ -245,17 +245,17 @@ def propose_poses(forms: SquareForms, t: int, number: int, k: int) -> tuple[Arra
     t -= 2 * k
     by_w, by_s = (_build_products(shape, t, count, what) @ space for what in "ws")
     shifted = _build_products(shape, t, count, "y") @ space if shape[0] > 1 else np.concatenate([by_w, by_s])
-    one, other = np.einsum("cj,jnd->cnd", np.random.default_rng(1).normal(size=(2, len(shifted))), shifted)
-    _, X = np.linalg.eig(lstsq(one, other)[0])
+    first, second = np.einsum("cj,jnd->cnd", np.random.default_rng(1).normal(size=(2, len(shifted))), shifted)
+    _, X = np.linalg.eig(lstsq(first, second)[0])
     if shape[0] > 1:
-        at = one @ X
-        found = np.einsum("nd,jnd->dj", at.conj(), shifted @ X)
-        found = found / np.linalg.norm(found, axis=1)[:, None]
+        at = first @ X
+        values = np.einsum("nd,jnd->dj", at.conj(), shifted @ X)
+        values = values / np.linalg.norm(values, axis=1)[:, None]
     else:
-        found = np.ones((space.shape[1], 1), dtype=complex)
-    norms = np.sum(found * found, axis=1)
+        values = np.ones((space.shape[1], 1), dtype=complex)
+    norms = np.sum(values * values, axis=1)
     real = np.abs(norms) > EXTRANEOUS_QUATERNION_TOL
     unit = by_w[0] @ X[:, real]
-    free = [np.sum(unit.conj() * each, axis=0) / np.sum(unit.conj() * unit, axis=0) for each in by_s @ X[:, real]]
-    found = found[real] / np.sqrt(norms[real])[:, None]
-    return found, forms.position(forms.poses.rotations(found), np.array(free).reshape(shape[1], len(found)).T)
+    free = [np.sum(unit.conj() * s, axis=0) / np.sum(unit.conj() * unit, axis=0) for s in by_s @ X[:, real]]
+    values = values[real] / np.sqrt(norms[real])[:, None]
+    return values, forms.position(forms.poses.rotations(values), np.array(free).reshape(shape[1], len(values)).T)

@@ -336,8 +336,8 @@ def build_shifting(count: int, offset: Any, turns: Sequence[tuple[int, Any]] = (
         Q[turns[0][0], turns[0][0]] = turns[0][1] @ turns[0][1]
     for k in range(1, d + 1):
         Q[k, k] = UNIT * UNIT
-        for other, v in turns:
-            Q[k, other] = 2 * UNIT * v[k - 1]
+        for place, v in turns:
+            Q[k, place] = 2 * UNIT * v[k - 1]
     return MovingPoint(N, Q, build_linear(count, (), 1))
 
 

@@ -79,11 +79,11 @@ class Planar(System):
     def tips_at(self, q: Array) -> Array:
         """Return the positions of the tips at a pose, each in the plane of its own curve; shape (legs, 3), metres."""
         X, n = self.pose(q), self.X_plane[:3, 2]
-        found = []
+        tips = []
         for curve, tip in zip(self.curves, self.tips, strict=True):
             at = X[:3, 3] + X[:3, :2] @ tip
-            found.append(at - n * float(n @ (at - curve.centre)))
-        return np.array(found)
+            tips.append(at - n * float(n @ (at - curve.centre)))
+        return np.array(tips)
 
     def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:
         """Return how far the platform's frame (m) and rotation (rad) can be from those at q; see ``registered``."""
@@ -99,11 +99,11 @@ class Planar(System):
         frame = self.frame
 
         def tips(numbers: Numbers) -> list[MovingPoint]:
-            found = []
+            points = []
             for tip in self.tips:
                 b = numbers.vector(tip / frame.size)
-                found.append(build_shifting(4, b * 0, ((3, b), (4, np.array([-b[1], b[0]], dtype=object)))))
-            return found
+                points.append(build_shifting(4, b * 0, ((3, b), (4, np.array([-b[1], b[0]], dtype=object)))))
+            return points
 
         def place(x: Sequence[float]) -> Array:
             at = frame.origin + frame.size * (np.array(x[:2]) @ frame.R)
@@ -159,28 +159,28 @@ def _build_third(
 ) -> Any:
     """The table of *tip₃ on its curve*, with γ tip₃ = α tip₁ + β tip₂ in complex numbers: α = b₂ − b₃, β = b₃ − b₁."""
     alpha, beta, gamma = (_build_multiplication(v) for v in (tips[1] - tips[2], tips[2] - tips[0], tips[1] - tips[0]))
-    one, other = conics
+    first, second = conics
     scale = (gamma.T @ gamma)[0, 0]
     centre = numbers.vector(frame.point(curve.centre))
     if isinstance(curve, Line):
         # n · (γ̄ γ tip₃) = |γ|² n · c, with n normal to the line through c
         d = convert_direction(curve.direction, frame, numbers)
         normal = np.array([-d[1], d[0]])
-        first, second = alpha.T @ gamma @ normal, beta.T @ gamma @ normal
+        a, b = alpha.T @ gamma @ normal, beta.T @ gamma @ normal
         return (
-            np.outer(one.N @ first, other.w)
-            + np.outer(one.w, other.N @ second)
-            - scale * (normal @ centre) * np.outer(one.w, other.w)
+            np.outer(first.N @ a, second.w)
+            + np.outer(first.w, second.N @ b)
+            - scale * (normal @ centre) * np.outer(first.w, second.w)
         )
     assert isinstance(curve, Circle)
     # |α tip₁ + β tip₂ − γ c|² = |γ|² ρ²
     rho = numbers.vector(np.array([curve.radius / frame.size]))[0]
-    first, second = alpha.T @ gamma @ centre, beta.T @ gamma @ centre
+    a, b = alpha.T @ gamma @ centre, beta.T @ gamma @ centre
     return (
-        np.outer((alpha.T @ alpha)[0, 0] * one.Q - 2 * (one.N @ first), other.w)
-        + np.outer(one.w, (beta.T @ beta)[0, 0] * other.Q - 2 * (other.N @ second))
-        + 2 * (one.N @ (alpha.T @ beta) @ other.N.T)
-        + scale * (centre @ centre - rho * rho) * np.outer(one.w, other.w)
+        np.outer((alpha.T @ alpha)[0, 0] * first.Q - 2 * (first.N @ a), second.w)
+        + np.outer(first.w, (beta.T @ beta)[0, 0] * second.Q - 2 * (second.N @ b))
+        + 2 * (first.N @ (alpha.T @ beta) @ second.N.T)
+        + scale * (centre @ centre - rho * rho) * np.outer(first.w, second.w)
     )
 
 

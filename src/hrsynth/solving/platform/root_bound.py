@@ -101,8 +101,8 @@ def _bound_two_bodies(system: ArticulatedPlatform, legs: Sequence[int]) -> Bound
         return None
     if isinstance(system.slide, Line):
         return Bound(2 ** sum(round_), "a sphere of each body, planes besides (Bézout)", "product")
-    found = [(4 if round_[body] else 2) * counts[1 - body] for body in (0, 1) if round_[body] or not any(round_)]
-    return Bound(min(found), "the product of degrees in space and on the circle (Bézout)", "product")
+    bounds = [(4 if round_[body] else 2) * counts[1 - body] for body in (0, 1) if round_[body] or not any(round_)]
+    return Bound(min(bounds), "the product of degrees in space and on the circle (Bézout)", "product")
 
 
 def _bound_body(system: Spatial, legs: Sequence[int]) -> Bound:
@@ -132,7 +132,7 @@ def _bound_places(system: Spatial, legs: Sequence[int]) -> Bound | None:
         three = next(([k for k in legs if side[k] == ball] for ball in shared if shared[ball] == 3), None)
         if three is None:
             continue
-        if any(len({other[k] for k in legs if k not in three}) == 2 for other in balls):
+        if any(len({ends[k] for k in legs if k not in three}) == 2 for ends in balls):
             return Bound(
                 8,
                 "two places of a ball with three rods, two of a ball with two more, two turns about their line",
@@ -170,9 +170,7 @@ def compute_degree_bound(system: Spatial, legs: Sequence[int]) -> Bound:
     with ctx.workprec(ROOT_ISOLATION_BITS_COUNT):
         rows = list(_list_conditions(system, legs))
         for a, b in _list_covers(rows):
-            known += [
-                each for each in _prove_doubles(rows, a, b) if all(each.is_distinct_from(other) for other in known)
-            ]
+            known += [new for new in _prove_doubles(rows, a, b) if all(new.is_distinct_from(old) for old in known)]
     why = "six conditions on points of a rigid body (degree of the poses among 16 coordinates"
     if known:
         why += f", less 2 for each of {len(known)} isolated double points at infinity"
@@ -227,7 +225,7 @@ class _Double:
             other.v @ (self.o - other.o),
             other.u @ (self.w - other.w),
         ]
-        return any(not each.contains(0) for each in tests)
+        return any(not test.contains(0) for test in tests)
 
     def is_isolated_solution(self, rows: Sequence[_Condition]) -> bool:
         """Return True if no other solution is near."""
@@ -248,7 +246,7 @@ class _Double:
                     acb(row.a0 * row.b0),
                 ]
             )
-        middles = np.array([[complex(each) for each in row] for row in table])
+        middles = np.array([[complex(entry) for entry in row] for row in table])
         k = int(np.argmax(np.abs(np.linalg.svd(middles)[2][-1])))
         try:
             rest = acb_mat([row[:k] + row[k + 1 :] for row in table]).solve(acb_mat([[-row[k]] for row in table]))
@@ -266,19 +264,19 @@ def _prove_doubles(rows: Sequence[_Condition], a: _Pair, b: _Pair) -> Iterator[_
         for side, pair in enumerate((a, b))
     )
     (o, n, first), (w, m, second) = _build_line(a, base), _build_line(b, platform)
-    for sign, other in product((1, -1), repeat=2):
+    for sign, turn in product((1, -1), repeat=2):
         # v = e₁ + i e₂, n = e₁ × e₂, but u = f₁ − i f₂, m = f₁ × f₂: R is a turn from (f₁, f₂, m) to (e₁, e₂, n)
-        found = _Double(o, _combine(first, sign * n, 1), sign * n, w, _combine(second, other * m, -1), other * m)
-        if found.is_isolated_solution(rows):
-            yield found
+        new = _Double(o, _combine(first, sign * n, 1), sign * n, w, _combine(second, turn * m, -1), turn * m)
+        if new.is_isolated_solution(rows):
+            yield new
 
 
 def _build_line(names: _Pair, points: Sequence[Any]) -> tuple[Any, Any, Any]:
     """A point of the line through two, one of which may be a direction, its unit vector and one normal to that."""
-    one, other = points if names[0][0] else reversed(points)
-    along = other - one if names[0][0] and names[1][0] else other
+    start, end = points if names[0][0] else reversed(points)
+    along = end - start if names[0][0] and names[1][0] else end
     across = np.eye(3, dtype=int).astype(object)[int(np.argmin([abs(float(x)) for x in along]))]
-    return one, _normalise(along), _normalise(np.cross(along, across))
+    return start, _normalise(along), _normalise(np.cross(along, across))
 
 
 def _combine(first: Any, n: Any, sign: int) -> Any:

@@ -129,7 +129,7 @@ class SystemModes(Value):
         without those that further conditions exclude (``out``)."""
         fitting = tuple(mode for mode in modes if mode.proved or mode.residual <= LOCUS_DISTANCE_TOL)
         open_ = len(modes) - len(fitting)
-        told = describe_fits(True, False, [mode.residual for mode in fitting if not mode.proved], len(out), open_)
+        text = describe_fits(True, False, [mode.residual for mode in fitting if not mode.proved], len(out), open_)
         near = tuple(
             replace(mode, near=True)
             for mode in (*out, *modes)
@@ -139,7 +139,7 @@ class SystemModes(Value):
             len(fitting),
             fitting,
             not open_,
-            f"{proof}; of these {told}",
+            f"{proof}; of these {text}",
             near,
             bound="none" if open_ else bound,
             enclosed=True,
@@ -159,8 +159,8 @@ def solve(system: System, *, near: bool = True, goal: Array | None = None) -> Sy
     surfaces are left to a solver that proposes poses: a homotopy for a rigid body, else msolve (``MissingExtra`` where
     that is not installed).
     """
-    system, told = snap_centres(system)
-    return replace(_solve(system, near, goal), snapped=told)
+    system, snapped = snap_centres(system)
+    return replace(_solve(system, near, goal), snapped=snapped)
 
 
 def _solve(system: System, near: bool, goal: Array | None) -> SystemModes:
@@ -172,12 +172,12 @@ def _solve(system: System, near: bool, goal: Array | None) -> SystemModes:
         if not roots.continuum:
             if not near:
                 return _judge(system, square, roots, None, goal)
-            others = (each for each in system.squares() if each.legs != square.legs)
+            others = (part for part in system.squares() if part.legs != square.legs)
             return _judge(
                 system,
                 square,
                 roots,
-                ((each, solve_square(each)) for each in islice(others, LEG_CHOICES_SOLVED_MAX)),
+                ((part, solve_square(part)) for part in islice(others, LEG_CHOICES_SOLVED_MAX)),
                 goal,
             )
     if system.has_surface_loci and not isinstance(system, TranslatingPlatform):
@@ -191,8 +191,8 @@ def solve_by_msolve(system: System, *, near: bool = True, goal: Array | None = N
     As :func:`solve`, but solutions that coincide are counted once, and near modes are looked for from the solutions of
     one choice of legs alone. Raises ``MissingExtra``, ``ExternalSolverFailure``.
     """
-    system, told = snap_centres(system)
-    return replace(_propose(system, near, goal, lambda part, enough: propose_by_msolve(part)), snapped=told)
+    system, snapped = snap_centres(system)
+    return replace(_propose(system, near, goal, lambda part, enough: propose_by_msolve(part)), snapped=snapped)
 
 
 def _propose(
@@ -209,11 +209,11 @@ def _propose(
         roots = None
         for number in range(POSE_CHARTS_TRIED_MAX):
             part = replace(part, chart=system.chart(number)) if number else part
-            found = proposer(part, None if most is None else most.most)
-            if found is None:
+            proposed = proposer(part, None if most is None else most.most)
+            if proposed is None:
                 break
-            roots = enclose_roots(part, found, most, system.balls(part.chart.frame), system.farthest)
-            if found.loose and roots.complex != (most and most.most) and find_dimension(system):
+            roots = enclose_roots(part, proposed, most, system.balls(part.chart.frame), system.farthest)
+            if proposed.loose and roots.complex != (most and most.most) and find_dimension(system):
                 roots = None
                 break
             if roots.apart or not roots.complete or part.chart.study is None:
@@ -279,8 +279,8 @@ def _judge(
 ) -> SystemModes:
     """The modes among the solutions of a square part, ``most`` at most; near ones are looked for from those of others
     too (not at all where these are None)."""
-    found = [_make_mode(system, square, root) for root in roots.real]
-    enclosed = roots.complete and all(mode.proved for mode in found)
+    listed = [_make_mode(system, square, root) for root in roots.real]
+    enclosed = roots.complete and all(mode.proved for mode in listed)
     bound, proof = (
         ("resultant", _describe_proof(system, roots))
         if isinstance(square, SquareSystem)
@@ -289,7 +289,7 @@ def _judge(
     if square.whole:
         return SystemModes(
             roots.complex,
-            tuple(found),
+            tuple(listed),
             enclosed and bound != "none",
             proof,
             (),
@@ -297,10 +297,10 @@ def _judge(
             None,
             bound,
             enclosed,
-            solved=(SquareSolution(system, square, roots, tuple(found), (True,) * len(found)),),
+            solved=(SquareSolution(system, square, roots, tuple(listed), (True,) * len(listed)),),
         )
     whole = [
-        mode for mode, root in zip(found, roots.real, strict=True) if not _is_beyond_platform(system, square, root)
+        mode for mode, root in zip(listed, roots.real, strict=True) if not _is_beyond_platform(system, square, root)
     ]
     at_goal = _find_goal(system, roots, whole, goal)
     left = [
@@ -320,12 +320,12 @@ def _judge(
         at_goal = _make_goal_mode(system, goal, square.legs)  # its solution is known too roughly to match
         modes, open_ = (*modes, at_goal), [mode for mode in open_ if not _is_goal_pose(system, mode.q, goal)]
         enclosed = False
-    near = () if others is None else _find_near(system, found, modes, others)
+    near = () if others is None else _find_near(system, listed, modes, others)
     fitting = [mode.residual for mode in modes if mode is not at_goal]
     proof = f"from {len(square.legs)} of {len(system.curves)} tips: {proof}; of these " + describe_fits(
-        at_goal is not None, lost, fitting, len(found) - len(left), len(open_)
+        at_goal is not None, lost, fitting, len(listed) - len(left), len(open_)
     )
-    kept = tuple(mode in left and mode not in open_ for mode in found)
+    kept = tuple(mode in left and mode not in open_ for mode in listed)
     return SystemModes(
         len(modes),
         modes,
@@ -336,7 +336,7 @@ def _judge(
         None,
         bound,
         enclosed,
-        solved=(SquareSolution(system, square, roots, tuple(found), kept),),
+        solved=(SquareSolution(system, square, roots, tuple(listed), kept),),
     )
 
 
@@ -355,12 +355,12 @@ def _make_goal_mode(system: System, goal: Array, legs: tuple[int, ...]) -> Syste
 
 
 def _find_goal(
-    system: System, roots: SolutionSet, found: Sequence[SystemMode], goal: Array | None
+    system: System, roots: SolutionSet, listed: Sequence[SystemMode], goal: Array | None
 ) -> SystemMode | None:
     """The solution that is the goal: the only one that can be, where all are known."""
     if goal is None or not roots.complete:
         return None
-    able = [mode for mode in found if not mode.proved or may_be_goal(system, mode.q, goal, mode.shift, mode.turn)]
+    able = [mode for mode in listed if not mode.proved or may_be_goal(system, mode.q, goal, mode.shift, mode.turn)]
     return able[0] if len(able) == 1 and able[0].proved else None
 
 
@@ -390,28 +390,31 @@ def _bound(system: System, part: PoseSystem, most: Bound | None, roots: Solution
 
 
 def _find_near(
-    system: System, found: Sequence[SystemMode], modes: Sequence[SystemMode], others: Iterable[tuple[Part, SolutionSet]]
+    system: System,
+    listed: Sequence[SystemMode],
+    modes: Sequence[SystemMode],
+    others: Iterable[tuple[Part, SolutionSet]],
 ) -> tuple[SystemMode, ...]:
     """Near modes, from all solutions of one square part and of others."""
-    starts = [mode.q for mode in found]
-    for other, found_there in others:
-        starts += [_make_mode(system, other, root).q for root in found_there.real]
+    starts = [mode.q for mode in listed]
+    for part, found_there in others:
+        starts += [_make_mode(system, part, root).q for root in found_there.real]
     return tuple(_make_near_mode(system, q) for q in find_stationary(system, starts, [mode.q for mode in modes]))
 
 
 def _make_mode(system: System, square: Part, root: RealSolution) -> SystemMode:
-    parameters = tuple(float(each.mid()) for each in root.parameters)
+    parameters = tuple(float(ball.mid()) for ball in root.parameters)
     q = square.place(parameters)
     at = system.tips_at(q)
     if isinstance(square, SquareSystem):
-        own = parameters
+        on_curves = parameters
         apart = system.apart(q, at, square.legs, _list_points(square, root))
     else:
-        own, apart = (), {k: miss + TIP_ROUNDING * system.size for k, miss in enumerate(root.misses)}
+        on_curves, apart = (), {k: miss + TIP_ROUNDING * system.size for k, miss in enumerate(root.misses)}
     shift, turn = system.spread(q, apart)
     sure = _is_proved_for_input(system, root) and bool(np.isfinite(shift))
     return SystemMode(
-        own,
+        on_curves,
         max(shift / system.size, turn),
         shift,
         turn,

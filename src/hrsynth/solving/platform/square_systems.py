@@ -58,7 +58,7 @@ class SquareSystem:
 
     def turns(self, turn: float) -> list[float]:
         """Origins of the circles of each unknown (rad)."""
-        return [each + turn for each in TURNS[: len(self.unknowns)]]
+        return [angle + turn for angle in TURNS[: len(self.unknowns)]]
 
     @property
     def round(self) -> list[bool]:
@@ -83,13 +83,13 @@ def build_three_surfaces(legs: Sequence[tuple[int, Surface]], whole: bool) -> tu
     first, second, last = _sort_surfaces([surface for _, surface in legs])
     all_three = (first, second, last)
     frame = choose_frame(all_three, extent(all_three, np.zeros((1, 3))))
-    one, two = (_find_normal(surface, last) for surface in (first, second))
-    along = cross(one, two)
+    normals = [_find_normal(surface, last) for surface in (first, second)]
+    along = cross(normals[0], normals[1])
     sine = length(along)
     d = normalise_vector(along) if sine > 0 else np.array([0.0, 0.0, 1.0])
     offset = frame.origin
     line = Line(
-        _find_foot((one, two), [_compute_offset(surface, last, offset) for surface in (first, second)], d) + offset, d
+        _find_foot(normals, [_compute_offset(surface, last, offset) for surface in (first, second)], d) + offset, d
     )
 
     def point(numbers: Numbers) -> Conic:
@@ -123,8 +123,8 @@ def _sort_surfaces(surfaces: Sequence[Surface]) -> list[Surface]:
     """A sphere last where there is one; of several candidates the one that leaves the others most apart."""
 
     def apart(last: int) -> tuple[bool, float]:
-        one, two = (_find_normal(surface, surfaces[last]) for k, surface in enumerate(surfaces) if k != last)
-        return isinstance(surfaces[last], Sphere), length(cross(one, two))
+        first, two = (_find_normal(surface, surfaces[last]) for k, surface in enumerate(surfaces) if k != last)
+        return isinstance(surfaces[last], Sphere), length(cross(first, two))
 
     last = max(range(3), key=apart)
     return [*(surface for k, surface in enumerate(surfaces) if k != last), surfaces[last]]
@@ -156,8 +156,8 @@ def _compute_offset(surface: Surface, last: Surface, origin: Array) -> float:
 
 def _find_foot(normals: Sequence[Array], offsets: Sequence[float], d: Array) -> Array:
     """The point of two planes nearest to the origin."""
-    found = np.linalg.lstsq(np.array([*normals, d]), np.array([*offsets, 0.0]), rcond=None)[0]
-    return np.asarray(found)
+    foot = np.linalg.lstsq(np.array([*normals, d]), np.array([*offsets, 0.0]), rcond=None)[0]
+    return np.asarray(foot)
 
 
 def _convert_plane(surface: Surface, last: Surface, frame: Any, numbers: Numbers) -> tuple[Any, Any]:
@@ -167,9 +167,9 @@ def _convert_plane(surface: Surface, last: Surface, frame: Any, numbers: Numbers
         n = convert_direction(surface.normal, frame, numbers)
         return n, n @ centre
     assert isinstance(last, Sphere)
-    other = numbers.vector(frame.point(last.centre))
-    rho, own = numbers.vector(np.array([last.radius, surface.radius]) / frame.size)
-    return 2 * (centre - other), rho * rho - own * own + centre @ centre - other @ other
+    last_centre = numbers.vector(frame.point(last.centre))
+    rho, radius = numbers.vector(np.array([last.radius, surface.radius]) / frame.size)
+    return 2 * (centre - last_centre), rho * rho - radius * radius + centre @ centre - last_centre @ last_centre
 
 
 def _build_affine(at: Any, slope: Any, w: Any) -> Conic:

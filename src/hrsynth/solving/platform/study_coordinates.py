@@ -35,17 +35,17 @@ def build_study_chart(
     gg = sum(_expand(v, v) for v in g)
 
     def tips(numbers: Numbers) -> list[MovingPoint]:
-        found = []
+        tips = []
         for k, tip in enumerate(b):
             v = numbers.vector(tip / frame.size)
             if k < len(b) - arrows:
                 Q = 4 * UNIT * UNIT * gg + 2 * UNIT * (back @ v) + (v @ v) * w
-                found.append(MovingPoint(UNIT * shift + R @ v, Q, w))
+                tips.append(MovingPoint(UNIT * shift + R @ v, Q, w))
             else:
                 o = numbers.vector(frame.point(hub))
                 N = R @ v + np.multiply.outer(w, o)
-                found.append(MovingPoint(N, (v @ v - o @ o) * w + 2 * (N @ o), w))
-        return found
+                tips.append(MovingPoint(N, (v @ v - o @ o) * w + 2 * (N @ o), w))
+        return tips
 
     def place(x: Sequence[float]) -> Array:
         ends = np.array([1.0, *x])

@@ -98,7 +98,7 @@ class TranslatingPlatform(TranslatingBodies):
             build_three_surfaces([(k, surfaces[k]) for k in legs], len(self.curves) == 3)
             for legs in combinations(surfaces, 3)
         ]
-        yield from (square for _, square in sorted(triples, key=lambda each: -each[0]))
+        yield from (square for _, square in sorted(triples, key=lambda triple: -triple[0]))
 
     def _on_curve(self, legs: tuple[int, int], one: Curve, other: Reach, whole: bool) -> SquareSystem:
         """The curve's points at which the other is met."""
@@ -186,7 +186,7 @@ class ArticulatedPlatform(TranslatingBodies):
 
     def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:
         """Return how far the bodies can be from their places at q (m); they do not rotate."""
-        sides = [[each for k, each in apart.items() if self.bodies[k] == body] for body in (0, 1)]
+        sides = [[distance for k, distance in apart.items() if self.bodies[k] == body] for body in (0, 1)]
         return max(min(side, default=math.inf) for side in sides), 0.0
 
     def chart(self, number: int) -> PoseParametrization:
@@ -217,8 +217,8 @@ class ArticulatedPlatform(TranslatingBodies):
     def squares(self) -> Iterator[SquareSystem]:
         """The pairs of legs, one on each body, each in both roles; first those where no plane is the slide's own."""
         curves = [(k, path) for k, path in enumerate(self.paths) if not isinstance(path, Surface)]
-        one, two = ([each for each in curves if self.bodies[each[0]] == body] for body in (0, 1))
-        roles = [roles for i in one for j in two for roles in ((i, j), (j, i))]
+        firsts, seconds = ([curve for curve in curves if self.bodies[curve[0]] == body] for body in (0, 1))
+        roles = [roles for i in firsts for j in seconds for roles in ((i, j), (j, i))]
         for first, onto in sorted(roles, key=lambda roles: self._is_parallel_to_slider(roles[1][1])):
             if not isinstance(onto[1], Point):
                 yield self._square((first[0], onto[0]), first[1], onto[1])
