@@ -122,7 +122,7 @@ class CarriedEquation(Zero):
 
     @cached_property
     def _maps(self) -> list[tuple[Any, ...]]:
-        return [(*each.maps(self.of), self.of(each.point), self.of(each.axis)) for each in self.freedoms]
+        return [(*freedom.maps(self.of), self.of(freedom.point), self.of(freedom.axis)) for freedom in self.freedoms]
 
     def point_and_arrow(self, x: Sequence[Any]) -> tuple[Any, Any, list[tuple[int, Any, Any]]]:
         """The point and the arrow, and their derivatives by the unknowns, by number."""
@@ -150,10 +150,10 @@ class CarriedEquation(Zero):
         """The derivative by each unknown at x."""
         point, arrow, by = self.point_and_arrow(x)
         along, turned = self.condition.slopes(point, arrow, self._of)
-        found = [0 * v for v in x]
+        slopes = [0 * v for v in x]
         for j, dp, dd in by:
-            found[j] = along @ dp + turned @ dd
-        return found
+            slopes[j] = along @ dp + turned @ dd
+        return slopes
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -191,13 +191,13 @@ class CarriedPlatform(System):
         R = np.broadcast_to(np.eye(3), (*q.shape[:-1], 3, 3))
         p = np.zeros((*q.shape[:-1], 3))
         for k in range(len(self.freedoms_) if joints is None else joints)[::-1]:
-            each, by = self.freedoms_[k], q[..., k, None, None]
-            if each.slides:
-                p = p + each.axis * by[..., 0]
+            freedom, by = self.freedoms_[k], q[..., k, None, None]
+            if freedom.slides:
+                p = p + freedom.axis * by[..., 0]
                 continue
-            rest, c, s = each.maps(np.asarray)
+            rest, c, s = freedom.maps(np.asarray)
             turn = rest + c * np.cos(by) + s * np.sin(by)
-            p = each.point + np.einsum("...ij,...j->...i", turn, p - each.point)
+            p = freedom.point + np.einsum("...ij,...j->...i", turn, p - freedom.point)
             R = turn @ R
         return R, p
 
@@ -212,14 +212,14 @@ class CarriedPlatform(System):
         values, slopes = [], []
         if not chosen:
             return np.zeros((*np.shape(q)[:-1], 0)), np.zeros((*np.shape(q)[:-1], 0, len(self.freedoms_)))
-        for each in chosen:
-            c, columns = each.condition, []
-            R, p = self.transform(q, each.joints)
+        for carried in chosen:
+            c, columns = carried.condition, []
+            R, p = self.transform(q, carried.joints)
             x, d = p + R @ c.b, R @ c.c
             values.append(c.value(x, d, np.asarray))
             along, turned = c.slopes(x, d, np.asarray)
             for k, freedom in enumerate(self.freedoms_):
-                if k >= each.joints:
+                if k >= carried.joints:
                     columns.append(0 * values[-1])
                     continue
                 Q, o = self.transform(q, k)
@@ -233,23 +233,23 @@ class CarriedPlatform(System):
     def most(self, chosen: Sequence[CarriedCondition]) -> int:
         """Return a bound of the isolated common zeros of as many conditions as joints."""
         n = len(self.freedoms_)
-        degrees = np.array([[each.degree(k, f) for k, f in enumerate(self.freedoms_)] for each in chosen])
-        alike = [i for i, each in enumerate(chosen) if _is_sphere_condition(each.condition)]
-        slides = [k for k, each in enumerate(self.freedoms_) if each.slides]
+        degrees = np.array([[carried.degree(k, f) for k, f in enumerate(self.freedoms_)] for carried in chosen])
+        alike = [i for i, carried in enumerate(chosen) if _is_sphere_condition(carried.condition)]
+        slides = [k for k, freedom in enumerate(self.freedoms_) if freedom.slides]
         tables = [degrees]
-        for one in alike if slides else ():  # the squares of slides are the same in all: differences have none
+        for kept in alike if slides else ():  # the squares of slides are the same in all: differences have none
             tables.append(table := degrees.copy())
             for i in alike:
-                if i != one and chosen[i].joints == chosen[one].joints:
-                    table[i] = np.maximum(degrees[i], degrees[one])
+                if i != kept and chosen[i].joints == chosen[kept].joints:
+                    table[i] = np.maximum(degrees[i], degrees[kept])
                     table[i, slides] = np.minimum(table[i, slides], 1)
-        found = [compute_permanent(table) for table in tables]
+        bounds = [compute_permanent(table) for table in tables]
         for (i, j), table in product(combinations(range(n), 2), tables):
             rest = [k for k in range(n) if k not in (i, j)]
             if self._has_common_point(chosen[i], chosen[j]) and not table[rest, 0].any():
                 bent = np.where(degrees[[i, j], 1:].any(axis=0), 4, 0)
-                found.append(compute_permanent(np.vstack([bent, table[rest, 1:]])))
-        return min(found)
+                bounds.append(compute_permanent(np.vstack([bent, table[rest, 1:]])))
+        return min(bounds)
 
     def _has_common_point(self, one: CarriedCondition, other: CarriedCondition) -> bool:
         """Return True if two conditions fix one point, and give the rotation of the first joint about its axis: N R η =
@@ -284,7 +284,7 @@ class CarriedPlatform(System):
 
     def unknowns(self, q: Array) -> Array:
         """All c, all s and slides t."""
-        slides = np.array([each.slides for each in self.freedoms_])
+        slides = np.array([freedom.slides for freedom in self.freedoms_])
         return np.concatenate(
             [np.where(slides, 1.0, np.cos(q)), np.where(slides, 0.0, np.sin(q)), np.where(slides, q, 0.0)]
         )

@@ -42,11 +42,11 @@ class ClosureCount:
 
 def _list_steps(freedoms: Sequence[Turn]) -> list[int]:
     """The degrees of w."""
-    return [1 if each.slides else 2 for each in freedoms]
+    return [1 if freedom.slides else 2 for freedom in freedoms]
 
 
 def _list_degrees(system: CarriedPlatform, chosen: Sequence[CarriedCondition]) -> list[list[int]]:
-    return [[each.degree(k, f) for k, f in enumerate(system.freedoms_)] for each in chosen]
+    return [[carried.degree(k, f) for k, f in enumerate(system.freedoms_)] for carried in chosen]
 
 
 def count_closures(system: CarriedPlatform, chosen: Sequence[CarriedCondition]) -> ClosureCount | None:
@@ -56,10 +56,10 @@ def count_closures(system: CarriedPlatform, chosen: Sequence[CarriedCondition]) 
     t = [max(2 * by, -(-sum(column) // by) * by) for by, column in zip(steps, zip(*degrees, strict=True), strict=True)]
     joint = 0
     while prod(d + 1 for d in t) <= JOINT_FORMS_MAX:
-        found = _compute_dimensions(system, chosen, degrees, steps, t)
-        for k, (one, other) in enumerate(pairwise(found)):
-            if one == other:
-                return ClosureCount(one, tuple(t), k)
+        dimensions = _compute_dimensions(system, chosen, degrees, steps, t)
+        for k, (dimension, next_) in enumerate(pairwise(dimensions)):
+            if dimension == next_:
+                return ClosureCount(dimension, tuple(t), k)
         t[joint % len(t)] += steps[joint % len(t)]
         joint += 1
     return None
@@ -73,11 +73,11 @@ def find_closures(system: CarriedPlatform, chosen: Sequence[CarriedCondition], c
     freedoms, t = system.freedoms_, counted.t
     steps = np.array(_list_steps(freedoms))
     sizes, rows = [d + 1 for d in t], []
-    for each, own in zip(chosen, _list_degrees(system, chosen), strict=True):
-        coefficients = _compute_coefficients(system, each, own)
-        for first in product(*(range(d - e + 1) for d, e in zip(t, own, strict=True))):
+    for carried, degrees in zip(chosen, _list_degrees(system, chosen), strict=True):
+        coefficients = _compute_coefficients(system, carried, degrees)
+        for first in product(*(range(d - e + 1) for d, e in zip(t, degrees, strict=True))):
             row = np.zeros(sizes, dtype=complex)
-            row[tuple(slice(f, f + e + 1) for f, e in zip(first, own, strict=True))] = coefficients
+            row[tuple(slice(f, f + e + 1) for f, e in zip(first, degrees, strict=True))] = coefficients
             rows.append(row.ravel())
     matrix = np.array(rows)
     Q, upper, _ = qr(matrix.conj().T, pivoting=True)
@@ -90,26 +90,28 @@ def find_closures(system: CarriedPlatform, chosen: Sequence[CarriedCondition], c
     moved = [
         [place[i] for i in _place_within(sizes, steps, counted.k + 1, shift)] for shift in np.eye(len(t), dtype=int)
     ]
-    by = np.array([np.linalg.lstsq(space[home], space[each], rcond=None)[0] for each in moved])
+    by = np.array([np.linalg.lstsq(space[home], space[places], rcond=None)[0] for places in moved])
     _, X = np.linalg.eig(np.einsum("kij,k->ij", by, np.random.default_rng(1).normal(size=len(t))))
-    found = np.einsum("ij,kjl,li->ik", np.linalg.inv(X), by, X)
-    slides = np.array([each.slides for each in freedoms])
+    eigenvalues = np.einsum("ij,kjl,li->ik", np.linalg.inv(X), by, X)
+    slides = np.array([freedom.slides for freedom in freedoms])
     with np.errstate(all="ignore"):
-        return np.asarray(np.where(slides, found, -1j * np.log(found)))
+        return np.asarray(np.where(slides, eigenvalues, -1j * np.log(eigenvalues)))
 
 
-def _compute_coefficients(system: CarriedPlatform, told: CarriedCondition, own: Sequence[int]) -> Array:
+def _compute_coefficients(system: CarriedPlatform, carried: CarriedCondition, degrees: Sequence[int]) -> Array:
     """Return the value at exp(i m q), |m| up to half the degree, and at powers of slides; one axis a joint."""
     nodes = [
         np.cos(np.pi * (np.arange(d + 1) + 0.5) / (d + 1)) if f.slides else 2 * np.pi * np.arange(d + 1) / (d + 1)
-        for f, d in zip(system.freedoms_, own, strict=True)
+        for f, d in zip(system.freedoms_, degrees, strict=True)
     ]
     grid = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1)
-    found = system.values(grid, [told])[0][..., 0].astype(complex)
-    for k, (each, at, d) in enumerate(zip(system.freedoms_, nodes, own, strict=True)):
-        basis = at[:, None] ** np.arange(d + 1) if each.slides else np.exp(1j * np.outer(at, np.arange(d + 1) - d / 2))
-        found = np.moveaxis(np.tensordot(np.linalg.inv(basis), found, (1, k)), 0, k)
-    return np.asarray(found / np.abs(found).max())
+    values = system.values(grid, [carried])[0][..., 0].astype(complex)
+    for k, (freedom, at, d) in enumerate(zip(system.freedoms_, nodes, degrees, strict=True)):
+        basis = (
+            at[:, None] ** np.arange(d + 1) if freedom.slides else np.exp(1j * np.outer(at, np.arange(d + 1) - d / 2))
+        )
+        values = np.moveaxis(np.tensordot(np.linalg.inv(basis), values, (1, k)), 0, k)
+    return np.asarray(values / np.abs(values).max())
 
 
 def _place_within(sizes: Sequence[int], steps: Array, k: int, shift: Array) -> list[int]:
@@ -132,67 +134,67 @@ def _compute_dimensions(
 
     count = prod(d + 1 for d in t)
     points = np.random.default_rng(0).integers(1, PRIME, size=(2, len(t), count)).astype(object)
-    axes = [reduce_mod(each.axis) for each in system.freedoms_]
+    axes = [reduce_mod(freedom.axis) for freedom in system.freedoms_]
     w = [
-        y if each.slides else (y * y + z * z * (a @ a)) % PRIME
-        for each, a, y, z in zip(system.freedoms_, axes, *points, strict=True)
+        y if freedom.slides else (y * y + z * z * (a @ a)) % PRIME
+        for freedom, a, y, z in zip(system.freedoms_, axes, *points, strict=True)
     ]
-    moves = [_move(each, a, y, z, v) for each, a, y, z, v in zip(system.freedoms_, axes, *points, w, strict=True)]
+    moves = [_move(freedom, a, y, z, v) for freedom, a, y, z, v in zip(system.freedoms_, axes, *points, w, strict=True)]
     rows = []
-    for each, own in zip(chosen, degrees, strict=True):
-        value = _evaluate(system, each, moves)
-        for v, d, by in zip(w, own, least, strict=True):
+    for carried, row in zip(chosen, degrees, strict=True):
+        value = _evaluate(system, carried, moves)
+        for v, d, by in zip(w, row, least, strict=True):
             value = value * _raise_power(v, d // by) % PRIME
-        rows.append(_evaluate_monomials(points, [d - e for d, e in zip(t, own, strict=True)]) * value % PRIME)
+        rows.append(_evaluate_monomials(points, [d - e for d, e in zip(t, row, strict=True)]) * value % PRIME)
     kernel, size = nmod_mat(np.vstack(rows).tolist(), PRIME).nullspace()
     columns = np.array([[int(v) for v in row[:size]] for row in kernel.table()], dtype=object).reshape(count, size)
-    found = []
+    dimensions = []
     for k in range(QUATERNION_POWERS_MAX + 1):
         left = [d - k * by for d, by in zip(t, least, strict=True)]
         if min(left) < 0:
             break
-        found.append(
+        dimensions.append(
             (nmod_mat(_evaluate_monomials(points, left).tolist(), PRIME) * nmod_mat(columns.tolist(), PRIME)).rank()
         )
         for v in w:
             columns = columns * v[:, None] % PRIME
-    return found
+    return dimensions
 
 
 def _move(freedom: Turn, a: Any, y: Any, z: Any, w: Any) -> tuple[Any, Any]:
     """The turns (n, 3, 3) and the displacements (n, 3) at points modulo the prime."""
     inverse = np.array([pow(int(v), -1, PRIME) for v in w], dtype=object)
-    one = np.eye(3, dtype=int).astype(object)
+    unit = np.eye(3, dtype=int).astype(object)
     if freedom.slides:
-        return np.broadcast_to(one, (len(y), 3, 3)), np.multiply.outer(z * inverse % PRIME, a) % PRIME
+        return np.broadcast_to(unit, (len(y), 3, 3)), np.multiply.outer(z * inverse % PRIME, a) % PRIME
     along = np.multiply.outer(a, a) % PRIME
     across = reduce_mod(hat(freedom.axis))
     squares, both = y * y - z * z * (a @ a) % PRIME, 2 * y * z
-    turn = (squares[:, None, None] * one + (2 * z * z)[:, None, None] * along + both[:, None, None] * across) % PRIME
+    turn = (squares[:, None, None] * unit + (2 * z * z)[:, None, None] * along + both[:, None, None] * across) % PRIME
     turn = turn * inverse[:, None, None] % PRIME
     o = reduce_mod(freedom.point)
     return turn, (o - turn @ o) % PRIME
 
 
-def _evaluate(system: CarriedPlatform, told: CarriedCondition, moves: Sequence[tuple[Any, Any]]) -> Any:
+def _evaluate(system: CarriedPlatform, carried: CarriedCondition, moves: Sequence[tuple[Any, Any]]) -> Any:
     """Return the values of a condition (n,), without joints that leave it unchanged."""
     count = len(moves[0][0])
-    x, d = (np.broadcast_to(reduce_mod(v), (count, 3)) for v in (told.condition.b, told.condition.c))
-    for k in range(told.joints - 1, -1, -1):
-        if k not in told.idle:
+    x, d = (np.broadcast_to(reduce_mod(v), (count, 3)) for v in (carried.condition.b, carried.condition.c))
+    for k in range(carried.joints - 1, -1, -1):
+        if k not in carried.idle:
             turn, shift = moves[k]
             x = (np.sum(turn * x[:, None, :], axis=2) + shift) % PRIME
             d = np.sum(turn * d[:, None, :], axis=2) % PRIME
-    return told.condition.value(x, d, reduce_mod) % PRIME
+    return carried.condition.value(x, d, reduce_mod) % PRIME
 
 
 def _evaluate_monomials(points: Array, t: Sequence[int]) -> Any:
     """All of the degrees; shape (forms, points)."""
-    found = [np.ones(points.shape[2], dtype=int).astype(object)]
+    monomials = [np.ones(points.shape[2], dtype=int).astype(object)]
     for y, z, d in zip(*points, t, strict=True):
-        each = [_raise_power(y, d - e) * _raise_power(z, e) % PRIME for e in range(d + 1)]
-        found = [one * other % PRIME for one, other in product(found, each)]
-    return np.array(found, dtype=object)
+        powers = [_raise_power(y, d - e) * _raise_power(z, e) % PRIME for e in range(d + 1)]
+        monomials = [monomial * power % PRIME for monomial, power in product(monomials, powers)]
+    return np.array(monomials, dtype=object)
 
 
 def _raise_power(v: Any, e: int) -> Any:

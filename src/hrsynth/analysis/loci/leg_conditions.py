@@ -80,33 +80,33 @@ def list_leg_conditions(
     """Return all leg solutions of the conditions of a locked leg on the platform, the goal's own first; and how far its
     geometry was moved (m). ``plane``: the normal of a motion in a plane; ``kept``: True if the platform does not
     rotate. Raises ``UnsupportedLocus``."""
-    own = [o for o in observation_model.observations if o.leg == leg.label]
-    twists = compute_leg_twists(goal, leg, own, observation_model.reference)
+    observed = [o for o in observation_model.observations if o.leg == leg.label]
+    twists = compute_leg_twists(goal, leg, observed, observation_model.reference)
     count = (6 if plane is None else 3) - twists.shape[1]
     if kept:
         count = 3 - twists.shape[1] + compute_range_basis(twists[3:], 1.0)[1].value
     if count <= 0:
         return [[]], 0.0
     path = decomposition.path(leg)
-    rods = _Rods.of(decomposition, path[-1], own, goal)
+    rods = _Rods.of(decomposition, path[-1], observed, goal)
     reasons = []
     for tip in _list_tips(decomposition, path, goal) if rods is None else (rods.tip,):
         try:
-            found = build_chain(decomposition, leg, own, goal, tip, "free")
+            chain = build_chain(decomposition, leg, observed, goal, tip, "free")
             ways: list[tuple[_Reading, Chain]] = [
-                (partial(_restrict_tip, rods=rods), found),
-                (_restrict_foot, found),
-                (_read_in_plane, found),
+                (partial(_restrict_tip, rods=rods), chain),
+                (_restrict_foot, chain),
+                (_read_in_plane, chain),
             ]
             if kept:
-                ways = [(_restrict_tip, replace(found, kept=True))]
+                ways = [(_restrict_tip, replace(chain, kept=True))]
             elif plane is not None:
-                bodies = (*found.bodies, ChainBody(plane, tip))
-                ways = [(_restrict_tip, replace(found, bodies=bodies, kept=True)), (_restrict_foot, found)]
-            for read, each in ways:
+                bodies = (*chain.bodies, ChainBody(plane, tip))
+                ways = [(_restrict_tip, replace(chain, bodies=bodies, kept=True)), (_restrict_foot, chain)]
+            for read, part in ways:
                 try:
-                    branches, radii = read(leg.label, each, count, tip, middle, plane)
-                    return branches, found.moved + (radii if radii > CHAIN_ROUNDING * found.extent else 0.0)
+                    branches, radii = read(leg.label, part, count, tip, middle, plane)
+                    return branches, chain.moved + (radii if radii > CHAIN_ROUNDING * chain.extent else 0.0)
                 except LocusDerivationFailure as error:
                     reasons.append(str(error))
         except LocusDerivationFailure as error:
@@ -124,10 +124,10 @@ def _list_tips(decomposition: LegDecomposition, path: Sequence[WordEdge], goal: 
     yield end
     if joints[-1].type is JointType.REVOLUTE:
         met = (
-            lines.find_meeting_point([(end, axes[0]), (at, each)], POINT_DISTANCE_TOL * goal.model.length)
-            for at, own in others
-            for each in own
-            if not lines.is_parallel(axes[0], each)
+            lines.find_meeting_point([(end, axes[0]), (at, axis)], POINT_DISTANCE_TOL * goal.model.length)
+            for at, directions in others
+            for axis in directions
+            if not lines.is_parallel(axes[0], axis)
         )
         yield from (at for at in met if at is not None)
 
@@ -148,7 +148,7 @@ class _Rods:
         """Return the rods of the last part of a leg, if it is of such rods."""
         if not isinstance(edge.word.items[0], Rods) or len(edge.joints) < 4:
             return None
-        watched = {each.link for each in own if isinstance(each, Direction)}
+        watched = {o.link for o in own if isinstance(o, Direction)}
         number = next((k for k, link in enumerate(edge.inside) if link in watched), 0)
         ends = [
             [
@@ -209,7 +209,8 @@ def _restrict_tip(
         elif missing:
             raise LocusDerivationFailure(f"{missing} conditions on the platform's rotation")
         if not any(
-            _is_same_locus(reach, other, found.length) and _has_same_rotations(turns, others) for other, others in seen
+            _is_same_locus(reach, known_reach, found.length) and _has_same_rotations(turns, others)
+            for known_reach, others in seen
         ):
             seen.append((reach, turns))
     b = middle.point(tip)
@@ -257,23 +258,23 @@ def _list_reach_conditions(
         flat = [reach.normal]
     elif isinstance(reach, Circle):
         flat = [reach.axis]
-    found: list[PoseCondition] = [OnPlane(leg, b, none, n, float(n @ o)) for n in flat]
+    conditions: list[PoseCondition] = [OnPlane(leg, b, none, n, float(n @ o)) for n in flat]
     if isinstance(reach, Circle | Sphere):
-        found.append(
+        conditions.append(
             OnRevolution(
                 leg, b, none, o, np.array([0.0, 0.0, 1.0]), np.array([(reach.radius / middle.size) ** 2, 0.0, -1.0])
             )
         )
     if isinstance(reach, Revolution):
-        found.append(OnRevolution(leg, b, none, o, reach.axis, _scale_profile(reach, middle)))
+        conditions.append(OnRevolution(leg, b, none, o, reach.axis, _scale_profile(reach, middle)))
     if isinstance(reach, SweptCircle):
         r, s = (np.array(radius / middle.size) for radius in (reach.radius, reach.other))
-        found.append(
+        conditions.append(
             OnTwoCircles(leg, b, none, o, reach.axis, r, reach.direction, s)
             if reach.other
             else OnCylinder(leg, b, none, o, reach.axis, r, reach.direction)
         )
-    return found
+    return conditions
 
 
 def _list_normals(d: Array) -> list[Array]:
@@ -308,15 +309,15 @@ def _restrict_foot(leg: str, found: Chain, count: int, tip: Array, middle: Origi
     moved = 0.0
     for known, _ in list_orientations(found):
         foot, rest = reverse_chain(found, known)
-        for own, _ in list_orientations(rest):
-            reach, radii = place(rest, own)
+        for turned, _ in list_orientations(rest):
+            reach, radii = place(rest, turned)
             moved = max(moved, radii)
             if (3 if plane is None else 2) - reach.freedoms != count:
                 raise LocusDerivationFailure("its proximal centre and its rotation of the platform")
             if not any(
-                _is_same_locus(reach, other, found.length)
+                _is_same_locus(reach, known_reach, found.length)
                 and np.linalg.norm(foot - at) <= RELATION_ANGLE_TOL * found.length
-                for other, at in seen
+                for known_reach, at in seen
             ):
                 seen.append((reach, foot))
     return [_list_foot_conditions(leg, reach, foot, middle, plane) for reach, foot in seen], moved

@@ -46,12 +46,12 @@ def _resolve(chain: Chain, known: Known, gain: float) -> list[tuple[Known, float
         _orient_watched_twice,
         _orient_between_three,
     ):
-        for found in step(chain, known):
-            if any(known[k] is None for k in found.places) or not found.turns:
+        for solved in step(chain, known):
+            if any(known[k] is None for k in solved.places) or not solved.turns:
                 return [
-                    each
-                    for turns, own in found.turns
-                    for each in _resolve(chain, _set_turns(known, found.places, turns), gain * own)
+                    solution
+                    for turns, factor in solved.turns
+                    for solution in _resolve(chain, _set_turns(known, solved.places, turns), gain * factor)
                 ]
     return [(known, gain)]
 
@@ -75,28 +75,28 @@ def _set_turns(known: Known, places: Sequence[int], turns: Sequence[Array]) -> K
 def list_ways(chain: Chain, known: Known, k: int) -> Iterator[tuple[Array, Way]]:
     """From the known bodies on either side of a body: that one's orientation, and the way to the body."""
     for step in (-1, 1):
-        at, found = k, Way()
+        at, way = k, Way()
         while at in range(len(known)) and known[at] is None:
             axis = chain.bodies[at if step < 0 else at + 1].axis if 0 <= at + (step > 0) < len(known) else None
             if axis is None:
                 break
-            found.append((at, axis))
+            way.append((at, axis))
             at += step
         else:
             Q = known[at] if at in range(len(known)) else None
             if Q is not None:
-                yield Q, found[::-1]
+                yield Q, way[::-1]
 
 
 def group_axes(way: Way) -> list[Way]:
     """A way cut where the axis changes its direction."""
-    found: list[Way] = []
+    groups: list[Way] = []
     for place, axis in way:
-        if found and lines.is_parallel(found[-1][-1][1], axis):
-            found[-1].append((place, axis))
+        if groups and lines.is_parallel(groups[-1][-1][1], axis):
+            groups[-1].append((place, axis))
         else:
-            found.append([(place, axis)])
-    return found
+            groups.append([(place, axis)])
+    return groups
 
 
 def _list_held_directions(chain: Chain, known: Known) -> Iterator[tuple[Array, list[Way], Array]]:
@@ -115,9 +115,9 @@ def find_kept_angle(chain: Chain) -> tuple[Array, Array]:
 
     Raises :class:`LocusDerivationFailure` where other axes turn it too, or where a differs between branches.
     """
-    found = [find_two_axes(chain, known) for known, _ in list_orientations(chain)]
-    first = found[0]
-    if any(not _is_same_orientation(a, first[0]) for a, *_ in found):
+    pairs = [find_two_axes(chain, known) for known, _ in list_orientations(chain)]
+    first = pairs[0]
+    if any(not _is_same_orientation(a, first[0]) for a, *_ in pairs):
         raise LocusDerivationFailure("the axis with which its end keeps an angle differs between leg solutions")
     return first[:2]
 
@@ -191,11 +191,11 @@ def _orient_watched_twice(chain: Chain, known: Known) -> Iterator[_Found]:
 
 def _list_gaps(chain: Chain, known: Known) -> Iterator[tuple[Array, Array, list[Way]]]:
     """Two known bodies with no known one between: their orientations, and the way in groups (none over a ball)."""
-    for one, other in pairwise([k for k, Q in enumerate(known) if Q is not None]):
-        axes = [chain.bodies[k].axis for k in range(one + 1, other + 1)]
-        Q, R = known[one], known[other]
+    for start, end in pairwise([k for k, Q in enumerate(known) if Q is not None]):
+        axes = [chain.bodies[k].axis for k in range(start + 1, end + 1)]
+        Q, R = known[start], known[end]
         if Q is not None and R is not None and all(axis is not None for axis in axes):
-            yield Q, R, group_axes([(one + 1 + n, axis) for n, axis in enumerate(axes) if axis is not None])
+            yield Q, R, group_axes([(start + 1 + n, axis) for n, axis in enumerate(axes) if axis is not None])
 
 
 def _orient_between_two(chain: Chain, known: Known) -> Iterator[_Found]:
@@ -249,7 +249,7 @@ def _solve_cones(a: Array, b: Array, start: Array, end: Array) -> list[tuple[Arr
     if square < -RELATION_ANGLE_TOL:
         return []
     s = math.sqrt(max(square, 0.0))
-    found = []
+    solutions = []
     ends = [p * a + q * b + sign * s * cross(a, b) for sign in (1.0, -1.0)]
     if any(lines.is_parallel(z, axis) for z in ends for axis in (a, b)):
         return None
@@ -260,8 +260,8 @@ def _solve_cones(a: Array, b: Array, start: Array, end: Array) -> list[tuple[Arr
         if first is not None and second is not None:
             slopes = np.column_stack([cross(a, end), cross(first[0] @ b, end)])
             still = first[1] == second[1] == 1.0
-            found.append((first[0], second[0], 1.0 if still else 4.0 + 9.0 / float(np.linalg.norm(slopes, -2))))
-    return found
+            solutions.append((first[0], second[0], 1.0 if still else 4.0 + 9.0 / float(np.linalg.norm(slopes, -2))))
+    return solutions
 
 
 def _is_same_orientation(one: Array, other: Array) -> bool:

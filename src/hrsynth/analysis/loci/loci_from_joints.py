@@ -27,22 +27,22 @@ def derive_reaches(chain: Chain) -> tuple[list[tuple[Reach, float]], float]:
 
     Raises :class:`LocusDerivationFailure`, also where two branches are nearly one: neither the same to 1e-10 nor 1e-7
     apart."""
-    found: list[tuple[Reach, float]] = []
+    reaches: list[tuple[Reach, float]] = []
     moved = 0.0
     for known, gain in list_orientations(chain):
         reach, radii = place(chain, known)
         if isinstance(reach, Quadrics):
             raise LocusDerivationFailure("two parts that move on a surface that is neither a plane nor a sphere")
         moved = max(moved, radii)
-        gap = min((compare_reaches(reach, other, chain.length) for other, _ in found), default=np.inf)
+        gap = min((compare_reaches(reach, known_reach, chain.length) for known_reach, _ in reaches), default=np.inf)
         if gap > POINT_DISTANCE_TOL:
-            found.append((reach, gain * chain.extent / chain.length if found else 1.0))
+            reaches.append((reach, gain * chain.extent / chain.length if reaches else 1.0))
         elif gap > POINT_DISTANCE_TOL / RANK_GAP_MIN:
             raise LocusDerivationFailure(f"two of its solutions differ by only {gap:.1e} characteristic lengths")
         else:
             moved = max(moved, gap * chain.length)
     moved = moved if moved > CHAIN_ROUNDING * chain.extent else 0.0
-    return found, MOVED_AXIS_LEVER_MAX * (chain.moved + moved)
+    return reaches, MOVED_AXIS_LEVER_MAX * (chain.moved + moved)
 
 
 @dataclass(eq=False)
@@ -110,8 +110,8 @@ class _Sum:
         if len(self.circles) == 1 and all(lines.is_parallel(d, self.lines[0]) for d in self.lines):
             return SweptCircle(self.centre, normal, float(np.linalg.norm(self.circles[0][1])), self.lines[0])
         if len(self.circles) == 2 and not self.lines:
-            one, other = (float(np.linalg.norm(spoke)) for _, spoke in self.circles)
-            return SweptCircle(self.centre, normal, one, first[1], other)
+            radius, second = (float(np.linalg.norm(spoke)) for _, spoke in self.circles)
+            return SweptCircle(self.centre, normal, radius, first[1], second)
         raise LocusDerivationFailure("circles and lines that lie in no common plane")
 
 
@@ -213,11 +213,11 @@ def compare_reaches(one: Reach | Quadrics, other: Reach | Quadrics, length: floa
         if isinstance(one, SweptCircle)
         else one.centre - other.centre
     )
-    found = [float(np.linalg.norm(between)) / length]
+    differences = [float(np.linalg.norm(between)) / length]
     for name in ("direction", "normal", "axis"):
         if hasattr(one, name):
-            found.append(float(np.linalg.norm(np.cross(getattr(one, name), getattr(other, name)))))
+            differences.append(float(np.linalg.norm(np.cross(getattr(one, name), getattr(other, name)))))
     for name, unit in (("radius", length), ("other", length), ("profile", 1.0)):
         if hasattr(one, name):
-            found.append(float(np.abs(np.subtract(getattr(one, name), getattr(other, name))).max()) / unit)
-    return max(found)
+            differences.append(float(np.abs(np.subtract(getattr(one, name), getattr(other, name))).max()) / unit)
+    return max(differences)

@@ -154,9 +154,9 @@ def _build_held_chain(
     end: Array | str,
 ) -> Chain:
     """The chain to a leg's tip, its observations held; raises ``LocusDerivationFailure``."""
-    own = [o for o in observation_model.observations if o.leg == leg.label]
+    observed = [o for o in observation_model.observations if o.leg == leg.label]
     return build_chain(
-        decomposition, decomposition.leg(leg.label), own, at, _evaluate(leg.tip, at) * at.model.length, end
+        decomposition, decomposition.leg(leg.label), observed, at, _evaluate(leg.tip, at) * at.model.length, end
     )
 
 
@@ -182,14 +182,14 @@ def _find_angle(
 ) -> KeptAngle:
     """The angle that a leg keeps; raises ``UnsupportedLocus`` where its joints do not show one."""
     try:
-        found = _build_held_chain(decomposition, observation_model, leg, goal, "free")
-        axis, direction = find_kept_angle(found)
+        chain = _build_held_chain(decomposition, observation_model, leg, goal, "free")
+        axis, direction = find_kept_angle(chain)
     except LocusDerivationFailure as error:
         raise UnsupportedLocus(
             decomposition.mechanism.name, f"how leg {leg.label} rotates the platform is not known: {error}"
         ) from None
     return KeptAngle(
-        leg.label, leg.body, goal.pose(leg.body)[:3, :3].T @ direction, axis, MOVED_AXIS_LEVER_MAX * found.moved
+        leg.label, leg.body, goal.pose(leg.body)[:3, :3].T @ direction, axis, MOVED_AXIS_LEVER_MAX * chain.moved
     )
 
 
@@ -203,17 +203,17 @@ def _derive_tip(
     B = _evaluate(leg.tip, goal) * goal.model.length
     X = goal.pose(leg.body)
     place = X[:3, :3].T @ (B - X[:3, 3])
-    own = [o for o in observation_model.observations if o.leg == leg.label]
+    observed = [o for o in observation_model.observations if o.leg == leg.label]
 
     def branches(at: ClosedConfiguration) -> tuple[list[tuple[Reach, float]], float]:
         return derive_reaches(_build_held_chain(decomposition, observation_model, leg, at, end))
 
     try:
-        found, moved = branches(goal)
+        reaches, moved = branches(goal)
     except LocusDerivationFailure as error:
         return _fit_tip(
             decomposition,
-            own,
+            observed,
             observation_model.reference,
             Tip(leg.label, leg.body, place, Point(B), doubt=str(error)),
             leg,
@@ -223,9 +223,9 @@ def _derive_tip(
         with suppress(LocusDerivationFailure):
             moved = branches(ClosedConfiguration(goal.model, goal.model.q0, 0.0))[1]
     freedoms = 0 if leg.fixed else 1 if leg.line is not None else 2 if leg.normal is not None else 3
-    here = found[0][0]
+    here = reaches[0][0]
     if here.freedoms == freedoms and np.linalg.norm(here.miss(B)) <= HIDDEN_ROBOT_RESIDUAL_TOL * goal.model.length:
-        return Tip(leg.label, leg.body, place, here, tuple(found[1:]), moved=moved)
+        return Tip(leg.label, leg.body, place, here, tuple(reaches[1:]), moved=moved)
     doubt = (
         f"its joints taken one by one leave {here.freedoms} dof, together {freedoms}"
         if here.freedoms != freedoms
@@ -233,7 +233,7 @@ def _derive_tip(
     )
     return _fit_tip(
         decomposition,
-        own,
+        observed,
         observation_model.reference,
         Tip(leg.label, leg.body, place, Point(B), doubt=doubt),
         leg,
@@ -298,7 +298,7 @@ def _list_rods(decomposition: LegDecomposition, leg: LockedLeg, along: Array, go
     """From joint centre to joint centre (m) of a leg, where that is parallel to a direction."""
     joints = [decomposition.mechanism.joints[name] for name in decomposition.leg(leg.label).joints]
     centres = [locate_joint(goal, joint)[0] * goal.model.length for joint in joints]
-    between = [other - one for one, other in combinations(centres, 2)]
+    between = [end - start for start, end in combinations(centres, 2)]
     small = POINT_DISTANCE_TOL * goal.model.length
     return [
         rod
@@ -333,24 +333,24 @@ def _find_slide(
     at, moving = _compute_offset(pattern, goal, goal.q)
     if pattern.slide is not None and not isinstance(pattern.slide, Tangent):
         return Line(at, _evaluate(pattern.slide, goal)), None
-    one, other = pattern.bodies
+    first, second = pattern.bodies
     graph = WordGraph(decomposition.mechanism, pattern.bodies, decomposition.platform).recognise()
-    for _, edge in graph.between(one, other):
+    for _, edge in graph.between(first, second):
         if len(edge.joints) == 4:
             joints = [decomposition.mechanism.joints[name] for name in edge.joints[:2]]
-            near, far = joints if edge.tail == one else joints[::-1]
+            near, far = joints if edge.tail == first else joints[::-1]
             (start, axes), (end, _) = locate_joint(goal, near), locate_joint(goal, far)
             spoke = (end - start - axes[0] * float(axes[0] @ (end - start))) * goal.model.length
             return Circle(at - spoke, axes[0], float(np.linalg.norm(spoke)), spoke), None
     assert isinstance(pattern.slide, Tangent)
-    first = _build_circle(pattern.slide, at, goal)
-    second = _mirror_circle(first, at)
+    circle = _build_circle(pattern.slide, at, goal)
+    mirrored = _mirror_circle(circle, at)
     kernel, _ = goal.kernel()
     step = kernel @ np.linalg.svd(moving @ kernel)[2][0]
     nearby, _ = solve(goal.model, goal.model.integrate(goal.q, MOVES[-1] * step), tolerance=CLOSURE_SOLVER_TOL)
-    there, _ = _compute_offset(pattern, goal, nearby)
-    circle = min((first, second), key=lambda circle: float(np.linalg.norm(circle.miss(there))))
-    return circle, f"no parallelogram joins {one} and {other}"
+    offset, _ = _compute_offset(pattern, goal, nearby)
+    nearest = min((circle, mirrored), key=lambda circle: float(np.linalg.norm(circle.miss(offset))))
+    return nearest, f"no parallelogram joins {first} and {second}"
 
 
 def _compute_offset(pattern: ConstraintPattern, goal: ClosedConfiguration, q: Array) -> tuple[Array, Array]:
@@ -369,7 +369,7 @@ def _follow_held_paths(
     held = FixedValuesTask.at(model, model.q0, reference, own)
     start = ClosedConfiguration.of(model, model.q0, RELATION_ANGLE_TOL)
     free, _ = compute_kernel_basis(np.vstack([model.jacobian(start.q), held.error_and_jacobian(model, start.q)[1]]))
-    found = []
+    positions = []
     directions = free.T
     if len(directions) > 1:
         mixed = np.random.default_rng(0).normal(size=(MIXED_LEG_MOTIONS_COUNT, len(directions))) @ directions
@@ -379,8 +379,8 @@ def _follow_held_paths(
             q, residual = solve(model, model.integrate(start.q, size * direction), held, tolerance=CLOSURE_SOLVER_TOL)
             X = model.pose(q, leg.body)
             if residual <= CLOSURE_RESIDUAL_TOL:
-                found.append(transform(X, place))
-    return found
+                positions.append(transform(X, place))
+    return positions
 
 
 def _evaluate(feature: NamedVector | BodyPoint, goal: ClosedConfiguration) -> Array:

@@ -73,10 +73,12 @@ def _build_rigid(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, .
     tips = np.array([_place_point(back @ at[tip.body], tip.place) for tip in confined.tips]).reshape(-1, 3)
     if n is None:
         size = confined.goal.model.length
-        arrows = np.array([size * (at[each.body][:3, :3] @ each.direction) for each in confined.angles]).reshape(-1, 3)
+        arrows = np.array([size * (at[angle.body][:3, :3] @ angle.direction) for angle in confined.angles]).reshape(
+            -1, 3
+        )
         planes = tuple(
-            Plane(p + each.axis * float(each.axis @ arrow), each.axis)
-            for each, arrow in zip(confined.angles, arrows, strict=True)
+            Plane(p + angle.axis * float(angle.axis @ arrow), angle.axis)
+            for angle, arrow in zip(confined.angles, arrows, strict=True)
         )
         system: Spatial | Planar = Spatial((*curves, *planes), np.vstack([tips, arrows]), len(arrows), p)
     else:
@@ -93,13 +95,13 @@ def _build_rigid(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, .
 def _build_articulated(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -> Model:
     """q is the first body's origin and the second's place on its circle about it."""
     assert confined.slide is not None
-    one, other = confined.bodies
-    p = at[one][:3, 3]
+    first, second = confined.bodies
+    p = at[first][:3, 3]
     tips = np.array([_place_point(at[tip.body], tip.place) - at[tip.body][:3, 3] for tip in confined.tips])
     sides = tuple(confined.bodies.index(tip.body) for tip in confined.tips)
     return Model(
         ArticulatedPlatform(curves, tips, sides, confined.slide),
-        partial(_place_on_curve, at[one], at[other], one, other, confined.slide),
+        partial(_place_on_curve, at[first], at[second], first, second, confined.slide),
         np.array([*p, 0.0]),
     )
 
@@ -159,14 +161,14 @@ def solve_all(
             "a system of equations", f"{len(first.curves)} legs and {first.freedoms} dof", first.seconds, time_limit
         )
     most = int(min(LEG_SOLUTION_CHOICES_MAX, time_limit / first.seconds))
-    made = [build_model(each) for each in islice(list_choices(confined), most)]
+    made = [build_model(choice) for choice in islice(list_choices(confined), most)]
     size = made[0].system.size
-    found = [
-        _scale_radii(solve(each.system, near=near, goal=None if k else each.home), each.system.size / size)
-        for k, each in enumerate(made)
+    solved = [
+        _scale_radii(solve(model.system, near=near, goal=None if k else model.home), model.system.size / size)
+        for k, model in enumerate(made)
     ]
     total = int(np.prod([1 + len(tip.others) for tip in confined.tips]))
-    modes = unite_modes(found, {tip.leg: 1 + len(tip.others) for tip in confined.tips}, size)
+    modes = unite_modes(solved, {tip.leg: 1 + len(tip.others) for tip in confined.tips}, size)
     doubts = [f"leg {tip.leg}: {tip.doubt}" for tip in confined.tips if tip.doubt is not None]
     doubts += [] if confined.doubt is None else [confined.doubt]
     if total > len(made):
@@ -202,14 +204,12 @@ def unite_modes(found: Sequence[SystemModes], branches: Mapping[str, int], size:
     """
     if len(found) == 1 or found[0].continuous_family is not None:
         return found[0]
-    modes = _drop_repeats([mode for each in found for mode in each.modes], size)
-    near = _drop_repeats([*modes, *(mode for each in found for mode in each.near)], size)[len(modes) :]
-    unclear = sum(
-        _compare_modes(one, other, size) <= one.radius + other.radius for one, other in combinations(modes, 2)
-    )
-    twice = sum(len(each.modes) for each in found) - len(modes)
+    modes = _drop_repeats([mode for listed in found for mode in listed.modes], size)
+    near = _drop_repeats([*modes, *(mode for listed in found for mode in listed.near)], size)[len(modes) :]
+    unclear = sum(_compare_modes(a, b, size) <= a.radius + b.radius for a, b in combinations(modes, 2))
+    twice = sum(len(listed.modes) for listed in found) - len(modes)
     legs = ", ".join(f"leg {leg}: {count}" for leg, count in branches.items() if count > 1)
-    counts = [f"{each} complex in {count}" for each, count in Counter(each.complex for each in found).items()]
+    counts = [f"{number} complex in {count}" for number, count in Counter(listed.complex for listed in found).items()]
     proofs = [f"{count} × ({text})" if count > 1 else text for text, count in Counter(e.proof for e in found).items()]
     proof = (
         f"{len(found)} combinations of the locked legs' solutions ({legs}), {', '.join(counts)}"
@@ -219,36 +219,36 @@ def unite_modes(found: Sequence[SystemModes], branches: Mapping[str, int], size:
     )
     special = found[0].singular_solutions or next(
         (
-            f"for other leg solutions: {each.singular_solutions}"
-            for each in found
-            if each.singular_solutions is not None
+            f"for other leg solutions: {listed.singular_solutions}"
+            for listed in found
+            if listed.singular_solutions is not None
         ),
         None,
     )
-    complete = not unclear and all(each.complete for each in found)
+    complete = not unclear and all(listed.complete for listed in found)
     return SystemModes(
-        sum(each.complex or 0 for each in found) - twice,
+        sum(listed.complex or 0 for listed in found) - twice,
         modes,
         complete,
         proof,
         near,
         special,
         None,
-        next((each.bound for each in found if each.bound != "resultant"), "resultant"),
-        all(each.enclosed for each in found),
+        next((listed.bound for listed in found if listed.bound != "resultant"), "resultant"),
+        all(listed.enclosed for listed in found),
         found[0].snapped,
-        tuple(part for each in found for part in each.solved),
-        any(each.open for each in found),
+        tuple(part for listed in found for part in listed.solved),
+        any(listed.open for listed in found),
     )
 
 
 def _drop_repeats(modes: Sequence[SystemMode], size: float) -> tuple[SystemMode, ...]:
     """Each pose once, the first of those that are one to rounding."""
-    found: list[SystemMode] = []
+    distinct: list[SystemMode] = []
     for mode in modes:
-        if all(_compare_modes(mode, other, size) > POINT_DISTANCE_TOL / RANK_GAP_MIN for other in found):
-            found.append(mode)
-    return tuple(found)
+        if all(_compare_modes(mode, known, size) > POINT_DISTANCE_TOL / RANK_GAP_MIN for known in distinct):
+            distinct.append(mode)
+    return tuple(distinct)
 
 
 def _compare_modes(one: SystemMode, other: SystemMode, size: float) -> float:

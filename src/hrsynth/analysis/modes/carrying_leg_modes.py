@@ -51,18 +51,18 @@ class _Half(CarriedEquation):
 
     def point_and_arrow(self, x: Sequence[Any]) -> tuple[Any, Any, list[tuple[int, Any, Any]]]:
         R, p, at = self.of(np.eye(3)), self.of(np.zeros(3)), list[tuple[int, Any, Any]]()
-        for k, each in enumerate(self.freedoms[: self.joints]):
+        for k, freedom in enumerate(self.freedoms[: self.joints]):
             if k in self.idle:
                 continue
-            a, o, t = self.of(each.axis), self.of(each.point), x[k]
-            if each.slides:
+            a, o, t = self.of(freedom.axis), self.of(freedom.point), x[k]
+            if freedom.slides:
                 at.append((k, None, R @ a))
                 p = p + R @ a * t
                 continue
             w = 1 + t * t * (a @ a)
             at.append((k, R @ a * (2 / w), p + R @ o))
             turn = (
-                np.eye(3, dtype=int) * (2 - w) + np.outer(a, a) * (2 * t * t) + self.of(hat(each.axis)) * (2 * t)
+                np.eye(3, dtype=int) * (2 - w) + np.outer(a, a) * (2 * t * t) + self.of(hat(freedom.axis)) * (2 * t)
             ) / w
             R, p = R @ turn, p + R @ (o - turn @ o)
         point, arrow = p + R @ self.of(self.condition.b), R @ self.of(self.condition.c)
@@ -106,10 +106,10 @@ def propose_zeros(system: CarriedPlatform, most: int) -> Array:
 
 def polish_zeros(system: CarriedPlatform, starts: Iterable[Array], enough: float = np.inf) -> Array:
     """The common zeros (k, n) to which Newton's method leads, each with its conjugate, until there are enough."""
-    slides = np.array([each.slides for each in system.freedoms_])
+    slides = np.array([freedom.slides for freedom in system.freedoms_])
     ends = (approach_zeros(lambda q: system.values(q, system.square), q, steps=100, longest=0.5) for q in starts)
-    found = collect_zeros(ends, enough, measure=partial(measure_joint_distances, slides))
-    return np.where(slides, found, np.angle(np.exp(1j * found.real)) + 1j * found.imag)
+    zeros = collect_zeros(ends, enough, measure=partial(measure_joint_distances, slides))
+    return np.where(slides, zeros, np.angle(np.exp(1j * zeros.real)) + 1j * zeros.imag)
 
 
 def solve_carried(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0) -> tuple[Model, SystemModes]:
@@ -127,11 +127,11 @@ def solve_carried(measured: MeasuredRobot, goal: ClosedConfiguration, error: flo
 def enclose_zeros(system: CarriedPlatform, proposed: Array) -> list[PoseBox]:
     """Boxes of common zeros in c, s and t, apart from each other."""
     n = len(system.freedoms_)
-    equations: list[Polynomial] = [system.equation(each) for each in system.square]
-    for k, each in enumerate(system.freedoms_):
+    equations: list[Polynomial] = [system.equation(carried) for carried in system.square]
+    for k, freedom in enumerate(system.freedoms_):
         equations += (
             [_FixedUnknown(k, 1), _FixedUnknown(n + k, 0)]
-            if each.slides
+            if freedom.slides
             else [UnitLength((k, n + k)), _FixedUnknown(2 * n + k, 0)]
         )
     return enclose_all(equations, map(system.unknowns, proposed))[0]
@@ -142,9 +142,10 @@ def _enclose_far(system: CarriedPlatform, proposed: Array, known: Sequence[PoseB
     from flint import acb, ctx
 
     equations: list[Polynomial] = [
-        _Half(each.condition, Poses.spatial(), None, system.freedoms_, each.joints, each.idle) for each in system.square
+        _Half(carried.condition, Poses.spatial(), None, system.freedoms_, carried.joints, carried.idle)
+        for carried in system.square
     ]
-    slides, found = np.array([each.slides for each in system.freedoms_]), list[PoseBox]()
+    slides, boxes = np.array([freedom.slides for freedom in system.freedoms_]), list[PoseBox]()
     with ctx.workprec(POSE_BOX_BITS_COUNT):
         for q in proposed:
             if np.abs(q.imag[~slides]).max(initial=0.0) < COMPLEX_ZERO_IMAGINARY_MIN or find_box_at(
@@ -166,9 +167,9 @@ def _enclose_far(system: CarriedPlatform, proposed: Array, known: Sequence[PoseB
                 False,
                 0,
             )
-            if box is not None and box.is_disjoint_from((*known, *found)):
-                found.append(replace(box, rounded=True))
-    return found
+            if box is not None and box.is_disjoint_from((*known, *boxes)):
+                boxes.append(replace(box, rounded=True))
+    return boxes
 
 
 def _judge(system: CarriedPlatform) -> SystemModes:
@@ -191,16 +192,18 @@ def _judge(system: CarriedPlatform) -> SystemModes:
         raise ExternalSolverFailure("the leg", f"{size}: of {most} solutions at most ({why}) {len(boxes)} have boxes")
     bodies = [_place_body(system, box) for box in boxes]
     if any(
-        all((a - b).contains(0) for a, b in zip(one, other, strict=True))
-        for k, one in enumerate(bodies)
-        for other in bodies[:k]
+        all((a - b).contains(0) for a, b in zip(body, before, strict=True))
+        for k, body in enumerate(bodies)
+        for before in bodies[:k]
     ):
         raise ExternalSolverFailure("the leg", f"{size}: several of {most} solutions have one pose of the platform")
-    besides = [system.equation(each) for each in system.told if each not in system.square]
+    besides = [system.equation(carried) for carried in system.told if carried not in system.square]
     real = [box for box in boxes if box.real]
     with ctx.workprec(POSE_BOX_BITS_COUNT):
         kept = [
-            box for box in real if box is at_goal[0] or not any(not each.value(box.box).contains(0) for each in besides)
+            box
+            for box in real
+            if box is at_goal[0] or not any(not equation.value(box.box).contains(0) for equation in besides)
         ]
         modes = [make_mode(system, box, not besides or box is at_goal[0]) for box in kept]
     proof = (
@@ -217,20 +220,20 @@ def _place_body(system: CarriedPlatform, box: PoseBox) -> list[Any]:
     """The position and the three columns of the turn that carries the platform from the goal, in balls."""
     from flint import ctx
 
-    found = list[Any]()
+    placed = list[Any]()
     with ctx.workprec(POSE_BOX_BITS_COUNT):
         for c in np.vstack([np.zeros(3), np.eye(3)]):
-            told = CarriedCondition(PoseCondition("", np.zeros(3), c), system.carrying)
-            at, arrow, _ = system.equation(told).point_and_arrow(box.box)
-            found += [*(arrow if c.any() else at)]
-    return found
+            carried = CarriedCondition(PoseCondition("", np.zeros(3), c), system.carrying)
+            at, arrow, _ = system.equation(carried).point_and_arrow(box.box)
+            placed += [*(arrow if c.any() else at)]
+    return placed
 
 
 def make_mode(system: CarriedPlatform, box: PoseBox, proved: bool, miss: float | None = None) -> SystemMode:
     """A real box as a mode, or as one that fits; ``miss``: how far it is from meeting all (sizes)."""
     n, x = len(system.freedoms_), box.middle.real
     q = np.array(
-        [x[2 * n + k] if each.slides else np.arctan2(x[n + k], x[k]) for k, each in enumerate(system.freedoms_)]
+        [x[2 * n + k] if freedom.slides else np.arctan2(x[n + k], x[k]) for k, freedom in enumerate(system.freedoms_)]
     )
     spread = [float(v.rad()) for v in _place_body(system, box)]
     shift, turn = system.size * float(np.linalg.norm(spread[:3])), 2.0 * float(np.linalg.norm(spread[3:]))

@@ -71,12 +71,12 @@ class PosedPlatform(System):
     def miss(self, box: PoseBox) -> float:
         """The largest distance from a condition (sizes) at the middle of a real box."""
         turn, p = box.pose(self.poses)
-        R, found = convert_from_quaternion(turn), [0.0]
+        R, misses = convert_from_quaternion(turn), [0.0]
         for c in self.conditions:
             point, arrow = p + R @ c.b, R @ c.c
             slope = np.hstack(c.slopes(point, arrow, np.asarray))
-            found.append(abs(float(c.value(point, arrow, np.asarray))) / max(1.0, float(np.linalg.norm(slope))))
-        return max(found)
+            misses.append(abs(float(c.value(point, arrow, np.asarray))) / max(1.0, float(np.linalg.norm(slope))))
+        return max(misses)
 
 
 def build_posed_platforms(measured: MeasuredRobot, goal: ClosedConfiguration) -> list[PosedPlatform]:
@@ -86,17 +86,17 @@ def build_posed_platforms(measured: MeasuredRobot, goal: ClosedConfiguration) ->
     _, middle = require_rigid_platform(measured, goal)
     motion, normal = measured.moving
     rest, seen = separate_sights(decomposition, measured.observation_model, goal)
-    found = [
+    by_leg = [
         list_leg_conditions(decomposition, leg, rest, goal, middle, normal, motion == "translations")
         for leg in decomposition.legs
     ]
-    moved = MOVED_AXIS_LEVER_MAX * sum(each for _, each in found)
-    held = any(branch for branches, _ in found for branch in branches)
+    moved = MOVED_AXIS_LEVER_MAX * sum(off for _, off in by_leg)
+    held = any(branch for branches, _ in by_leg for branch in branches)
     ways = [(turned, list_plane_conditions(seen, middle, turned)) for turned in ((False,) if held else (False, True))]
-    turned, own = min(ways, key=lambda way: sum(c.degree for c in way[1]))
-    counts = {leg.label: len(branches) for leg, (branches, _) in zip(decomposition.legs, found, strict=True)}
-    found.append(([own], 0.0))
-    legs: list[Branches] = [branches for branches, _ in found]
+    turned, fewest = min(ways, key=lambda way: sum(c.degree for c in way[1]))
+    counts = {leg.label: len(branches) for leg, (branches, _) in zip(decomposition.legs, by_leg, strict=True)}
+    by_leg.append(([fewest], 0.0))
+    legs: list[Branches] = [branches for branches, _ in by_leg]
     if prod(map(len, legs)) > LEG_SOLUTION_CHOICES_MAX:
         raise UnsupportedLocus(name, f"its legs have {prod(map(len, legs))} combinations of leg solutions")
     if any(
@@ -148,7 +148,7 @@ def _drop_repeats(conditions: Sequence[PoseCondition]) -> tuple[tuple[PoseCondit
 
 def bound_posed(measured: MeasuredRobot, goal: ClosedConfiguration) -> int:
     """Return a root bound of the modes, complex ones too. Raises ``UnsupportedLocus``."""
-    return sum(_build_forms(measured, each).most for each in build_posed_platforms(measured, goal))
+    return sum(_build_forms(measured, platform).most for platform in build_posed_platforms(measured, goal))
 
 
 def solve_posed(
@@ -158,8 +158,8 @@ def solve_posed(
     and ``ExternalSolverFailure`` where not all poses are enclosed that there may be, or the choices need more than
     ``time_limit`` (s)."""
     systems = [
-        replace(each, error=each.error + max([error, *(sight.error(error, goal) for sight in each.seen)]))
-        for each in build_posed_platforms(measured, goal)
+        replace(platform, error=platform.error + max([error, *(sight.error(error, goal) for sight in platform.seen)]))
+        for platform in build_posed_platforms(measured, goal)
     ]
     if not np.isfinite(error):
         raise UnsupportedLocus(
@@ -174,7 +174,7 @@ def solve_posed(
         first.home,
         first.back,
     )
-    forms, found = _build_forms(measured, first), list[SystemModes]()
+    forms, solved = _build_forms(measured, first), list[SystemModes]()
     needed = len(systems) * (FEW_FORMS_SECONDS + FORMS_SECONDS * (forms.size / LARGEST_FORMS) ** 3)
     if needed > max(time_limit, FEW_FORMS_SECONDS * (len(systems) == 1)):
         raise ExternalSolverFailure(
@@ -184,10 +184,10 @@ def solve_posed(
             "Observe other legs, or raise --time-limit.",
         )
     for system in systems:
-        found.append(_judge(system, _build_forms(measured, system), system is first))
-        if not found[-1].complete:
-            raise ExternalSolverFailure("the conditions on the pose", found[-1].proof)
-    return made, unite_modes(found, first.branches, first.size)
+        solved.append(_judge(system, _build_forms(measured, system), system is first))
+        if not solved[-1].complete:
+            raise ExternalSolverFailure("the conditions on the pose", solved[-1].proof)
+    return made, unite_modes(solved, first.branches, first.size)
 
 
 def _build_forms(measured: MeasuredRobot, system: PosedPlatform) -> SquareForms:
@@ -220,11 +220,11 @@ def _judge(system: PosedPlatform, forms: SquareForms, own: bool) -> SystemModes:
     proposed = propose_poses(forms, forms.degree, forms.most, 0)
     boxes, lost = ([], 1) if proposed is None else enclose_poses(forms, slack, proposed, most)
     if len(boxes) < most:
-        found = bound(forms)
-        if found is not None:
-            most, why, named = found[0], f"ranks modulo a prime of 62 bits, in degree {found[1]}", "rank"
+        bounded = bound(forms)
+        if bounded is not None:
+            most, why, named = bounded[0], f"ranks modulo a prime of 62 bits, in degree {bounded[1]}", "rank"
             if lost or len(boxes) < most:
-                proposed, lost = propose_poses(forms, found[1], most, found[2]), 1
+                proposed, lost = propose_poses(forms, bounded[1], most, bounded[2]), 1
         if lost:
             boxes = [] if proposed is None else enclose_poses(forms, slack, proposed)[0]
     at_goal = [box for box in boxes if own and box.real and box.has_pose(np.eye(len(box.middle))[0])]

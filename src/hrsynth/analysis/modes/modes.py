@@ -193,8 +193,8 @@ class AssemblyModes(Result, shown_as="modes"):
                 f"{count} self-motion{'s' * (count > 1)}, and {len(self.modes)} real that "
                 f"{'lies' if len(self.modes) == 1 else 'lie'} on none"
             )
-        other = f" and {len(self.antipodal)} antipodal" if self.antipodal else ""
-        return f"{len(self.modes)} real{other}" + (
+        antipodal = f" and {len(self.antipodal)} antipodal" if self.antipodal else ""
+        return f"{len(self.modes)} real{antipodal}" + (
             "" if self.found.complex is None else f" of {self.found.complex} complex"
         )
 
@@ -214,13 +214,14 @@ class AssemblyModes(Result, shown_as="modes"):
     continuous_family = Shown(int | None, lambda self: self.found.continuous_family)
     motions_record = Shown(
         list[FollowedMotion],
-        lambda self: [FollowedMotion(self.pose_of(each), each) for each in self.self_motions],
+        lambda self: [FollowedMotion(self.pose_of(motion), motion) for motion in self.self_motions],
         As("self_motions"),
     )
     snapped = Shown(
         list[MeantLegs],
         lambda self: [
-            MeantLegs(each.where, [self.labels[k] for k in each.legs], each.defect) for each in self.found.snapped
+            MeantLegs(snapped.where, [self.labels[k] for k in snapped.legs], snapped.defect)
+            for snapped in self.found.snapped
         ],
     )
     limits_ignored = LIMITS_IGNORED
@@ -348,9 +349,9 @@ def modes(
         wanted = motion.goal(asked, setup.robot.name)
         goal = track_to_pose(goal, setup.all_samples.observation_model, asked, motion)
     measured = MeasuredRobot.of(setup, real)
-    found = _list_modes(setup, measured, goal, wanted, real, as_written, time_limit)
-    near = find_near_modes(setup, goal, measured.observation_model, found.modes, found.candidates, bound)
-    return replace(found, candidates=(), near_modes=near, measurement_bound=bound)
+    listed = _list_modes(setup, measured, goal, wanted, real, as_written, time_limit)
+    near = find_near_modes(setup, goal, measured.observation_model, listed.modes, listed.candidates, bound)
+    return replace(listed, candidates=(), near_modes=near, measurement_bound=bound)
 
 
 def _list_modes(
@@ -369,7 +370,7 @@ def _list_modes(
     free = setup.dof - measured.rank
     if free:
         text = f"the {'motors' if real else 'measured values'} leave {free} of the platform's dof undetermined"
-        own = self_motion(goal, measured.observation_model, list_placing_links(setup.decomposition), goal=True)
+        goal_motion = self_motion(goal, measured.observation_model, list_placing_links(setup.decomposition), goal=True)
         return AssemblyModes(
             setup,
             kind,
@@ -377,7 +378,7 @@ def _list_modes(
             pose,
             make_family(f"{text}: a continuous family of dimension {free}", free),
             (),
-            self_motions=() if own is None else (own,),
+            self_motions=() if goal_motion is None else (goal_motion,),
         )
     report("modes")
     try:
@@ -405,11 +406,11 @@ def _list_modes(
         if listed.found.continuous_family is not None
         else str(listed.found.singular_solutions)
     )
-    found = _list_by_search(setup, measured.observation_model, goal, pose, kind, why)
+    searched = _list_by_search(setup, measured.observation_model, goal, pose, kind, why)
     return (
-        found
+        searched
         if moving or not any(mode.proved for mode in listed.modes)
-        else replace(listed, self_motions=found.self_motions)
+        else replace(listed, self_motions=searched.self_motions)
     )
 
 
@@ -421,27 +422,27 @@ def _list_formation(setup: ObservedRobot, where: object, real: bool) -> Assembly
             remedy="Omit the option: the values at the file's configuration are fixed.",
         )
     report("modes")
-    found, goal = list_formation_modes(setup), setup.all_samples.start
+    formed, goal = list_formation_modes(setup), setup.all_samples.start
     system = SystemModes(
-        found.complex,
+        formed.complex,
         (),
-        found.complete,
-        found.proof,
-        singular_solutions=found.degenerate,
-        continuous_family=found.continuum,
-        bound=found.bound,
+        formed.complete,
+        formed.proof,
+        singular_solutions=formed.degenerate,
+        continuous_family=formed.continuum,
+        bound=formed.bound,
     )
     first = setup.samples.observation_model.platform
     listed = list[AssemblyMode]()
-    for each in found.modes:
-        at = each.configuration
+    for formed_mode in formed.modes:
+        at = formed_mode.configuration
         whole = Assembly(at, (), tuple(list_joints_beyond(at.model, at.q)))
         listed.append(
             AssemblyMode(
-                Pose.of(each.bodies[first]),
+                Pose.of(formed_mode.bodies[first]),
                 np.inf,
                 np.pi,
-                each.residual,
+                formed_mode.residual,
                 at is goal,
                 whole.reachable,
                 None,
@@ -450,10 +451,10 @@ def _list_formation(setup: ObservedRobot, where: object, real: bool) -> Assembly
                 whole.beyond,
                 (),
                 at,
-                proved=found.complete,
+                proved=formed.complete,
                 length=goal.model.length,
-                bodies=each.bodies,
-                opposite=each.opposite,
+                bodies=formed_mode.bodies,
+                opposite=formed_mode.opposite,
             )
         )
     return AssemblyModes(
@@ -463,7 +464,7 @@ def _list_formation(setup: ObservedRobot, where: object, real: bool) -> Assembly
         Pose.of(goal.pose(first)),
         system,
         tuple(mode for mode in listed if not mode.opposite),
-        formation=found.formation,
+        formation=formed.formation,
         antipodal=tuple(mode for mode in listed if mode.opposite),
     )
 
@@ -515,7 +516,7 @@ def _list_by_search(
     """List the modes that a search finds, with the reason why no list can be complete."""
     done = search(goal, observation_model, list_placing_links(setup.decomposition))
     size = max((motion.dimension for motion in done.self_motions), default=None)
-    found = SystemModes(
+    system_modes = SystemModes(
         None,
         (),
         False,
@@ -528,7 +529,7 @@ def _list_by_search(
         kind,
         goal,
         pose,
-        found,
+        system_modes,
         tuple(_read_found(setup, observation_model, mode, mode.configuration is goal) for mode in done.modes),
         tuple(_read_found(setup, observation_model, mode) for mode in done.near),
         self_motions=done.self_motions,
@@ -581,24 +582,25 @@ def _list_by_system(
     if not answers:
         raise reasons[0]
     # all dof are observed: a continuous family is that of legs which tips alone do not show
-    made, found = max(
-        answers, key=lambda each: (each[1].complete, each[1].continuous_family is None, not may_count_more(each[0]))
+    made, solved = max(
+        answers,
+        key=lambda answer: (answer[1].complete, answer[1].continuous_family is None, not may_count_more(answer[0])),
     )
     if free is not None and made.closing is None:
-        found = replace(found, proof=f"without couplings, which only exclude poses: {found.proof}")
+        solved = replace(solved, proof=f"without couplings, which only exclude poses: {solved.proof}")
     reader = ModeReader(setup, measured.observation_model if free is None else free[0].observation_model, goal, made)
-    at_goal = min(found.modes, key=reader.away, default=None)
-    ordered = sorted(found.modes, key=lambda mode: mode is not at_goal)
+    at_goal = min(solved.modes, key=reader.away, default=None)
+    ordered = sorted(solved.modes, key=lambda mode: mode is not at_goal)
     read = [reader.read(mode, mode is at_goal) for mode in ordered]
-    if isinstance(made.system, NaturalPlatform) and found.enclosed:
+    if isinstance(made.system, NaturalPlatform) and solved.enclosed:
         read = [prove_existence(mode, goal, measured.observation_model, setup.normal.moved) for mode in read]
-    near = [reader.read(mode, False) for mode in found.near if reader.away(mode) > NEAR_POSE_DIFFERENCE_TOL]
+    near = [reader.read(mode, False) for mode in solved.near if reader.away(mode) > NEAR_POSE_DIFFERENCE_TOL]
     return AssemblyModes(
         setup,
         kind,
         goal,
         pose,
-        found,
+        solved,
         tuple(mode for mode in read if not mode.opposite),
         tuple(mode for mode in near if not mode.opposite),
         model=made,

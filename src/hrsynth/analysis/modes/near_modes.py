@@ -102,8 +102,8 @@ def descend(
             break
     else:
         return None
-    angle, there = _find_largest(error, held), compute_relation(at, observation_model)
-    if there.rank == there.dof.value and there.seen.weakest >= NONZERO_SINGULAR_VALUE_MIN:
+    angle, relation = _find_largest(error, held), compute_relation(at, observation_model)
+    if relation.rank == relation.dof.value and relation.seen.weakest >= NONZERO_SINGULAR_VALUE_MIN:
         return StationaryPose(
             at, angle, bool(_compute_loop_rates(at, held, motions, rates).min(initial=1.0) > 0.0), False
         )
@@ -161,7 +161,7 @@ def find_near_modes(
 ) -> tuple[NearMode, ...]:
     """The near modes with differences up to ``bound`` (rad) to which candidates lead, those of least difference first:
     isolated minima, none of them the goal or a ``known`` mode, and one of those that are connected."""
-    held, found = (
+    held, near_modes = (
         FixedValuesTask.at(goal.model, goal.q, observation_model.reference, observation_model.observations),
         list[NearMode](),
     )
@@ -170,14 +170,17 @@ def find_near_modes(
         if near is None or near.angle > bound:
             continue
         bodies = near.bodies or {}
-        others = [{body: goal.pose(body) for body in bodies}, *(each.bodies or {} for each in (*known, *found))]
+        others = [
+            {body: goal.pose(body) for body in bodies},
+            *(known_mode.bodies or {} for known_mode in (*known, *near_modes)),
+        ]
         if all(
-            bodies_apart(bodies, other, observation_model, goal.model.length) > NEAR_POSE_DIFFERENCE_TOL
-            for other in others
+            bodies_apart(bodies, poses, observation_model, goal.model.length) > NEAR_POSE_DIFFERENCE_TOL
+            for poses in others
         ):
-            found.append(near)
-    families = [each for each in found if each.family]
-    return tuple(sorted((each for each in found if each not in families[1:]), key=lambda each: each.angle))
+            near_modes.append(near)
+    families = [mode for mode in near_modes if mode.family]
+    return tuple(sorted((mode for mode in near_modes if mode not in families[1:]), key=lambda mode: mode.angle))
 
 
 def _make_near_mode(
@@ -204,7 +207,7 @@ def _make_near_mode(
         )
     distance, turned = measure_distance(setup.motion, goal, mode)
     return NearMode(
-        **{each.name: getattr(mode, each.name) for each in fields(AssemblyMode)},
+        **{field.name: getattr(mode, field.name) for field in fields(AssemblyMode)},
         angle=angle,
         distance=distance,
         turned=turned,
@@ -223,21 +226,21 @@ def describe_poses_alike(modes: Sequence[AssemblyMode], near: Sequence[NearMode]
     count = len(modes) + len(near)
     exact = sum(not mode.goal for mode in modes)
     others = [f"{exact} with the same values"] * bool(exact)
-    isolated = [each for each in near if not each.family]
+    isolated = [mode for mode in near if not mode.family]
     if len(isolated) == 1:
         others.append(f"one that differs {isolated[0].differs}")
     elif isolated:
         others.append(f"{len(isolated)} that differ by up to {format_degrees(isolated[-1].angle)}")
-    others += [f"a continuous family that differs {each.differs} at one of its poses" for each in near if each.family]
+    others += [f"a continuous family that differs {mode.differs} at one of its poses" for mode in near if mode.family]
     return f"{count} poses look the same: {', '.join(['the goal', *others[:-1]])} and {others[-1]}"
 
 
 def measure_distance(motion: PlatformMotion, goal: ClosedConfiguration, mode: AssemblyMode) -> tuple[float, float]:
     """Return the platform's distance from its pose at the goal (m, rad)."""
-    home, there = goal.pose(motion.link), mode.pose
-    at = np.array([there.x, there.y, there.z], dtype=float)
+    home, pose = goal.pose(motion.link), mode.pose
+    at = np.array([pose.x, pose.y, pose.z], dtype=float)
     return float(np.linalg.norm(at - motion.position(home))), (
-        0.0 if there.rotation is None else compute_rotation_angle(there.rotation @ home[:3, :3].T)
+        0.0 if pose.rotation is None else compute_rotation_angle(pose.rotation @ home[:3, :3].T)
     )
 
 
