@@ -170,13 +170,13 @@ def solve_requested_poses(
             for each in poses
         ]
     if len(found) < len(set(poses)) or (by_modes and unreached):
-        from .modes.modes import at_mode, modes
+        from .modes.modes import assemble_at_mode, modes
 
         listed = modes(setup, at=about)
         for each in poses:
             try:
                 if isinstance(each, ModeNumber):
-                    found[each] = at_mode(listed, each)
+                    found[each] = assemble_at_mode(listed, each)
                 elif by_modes and isinstance(each, Pose) and each in unreached:
                     found[each] = _choose_assembled_mode(listed, each, unreached[each])
             except PoseReachFailure as error:
@@ -186,7 +186,7 @@ def solve_requested_poses(
 
 def _choose_assembled_mode(listed: AssemblyModes, pose: Pose, refused: PoseReachFailure) -> ClosedConfiguration:
     """The robot at the one mode with this pose at which it was found assembled; raises ``refused`` if there is none."""
-    from .modes.modes import at_mode
+    from .modes.modes import assemble_at_mode
 
     motion, model = listed.setup.motion, listed.goal.model
     wanted = motion.goal(pose, listed.setup.robot.name)
@@ -199,4 +199,4 @@ def _choose_assembled_mode(listed: AssemblyModes, pose: Pose, refused: PoseReach
     ]
     if len(met) != 1:
         raise refused
-    return at_mode(listed, ModeNumber(met[0]))
+    return assemble_at_mode(listed, ModeNumber(met[0]))

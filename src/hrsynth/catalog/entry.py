@@ -15,8 +15,8 @@ from ..analysis.derive import derive
 from ..analysis.exact import ExactArchitecture, get_architecture
 from ..analysis.measured import MeasuredRobot
 from ..analysis.modes.modes import modes
+from ..analysis.modes.tip_modes import bound_modes
 from ..analysis.modes.tip_modes import count_modes as counted_modes
-from ..analysis.modes.tip_modes import expected_modes
 from ..analysis.observed import ObservedRobot
 from ..analysis.pose_requests import observe
 from ..analysis.verdict import CONTROLLABLE, Verdict, compute_verdict
@@ -304,9 +304,7 @@ def _count_modes(setup: ObservedRobot, fewest: Sequence[Sequence[str]]) -> dict[
 
     def tried() -> Iterator[int]:
         yield 0
-        yield from sorted(range(1, len(fewest)), key=lambda k: expected_modes(robots[k], at))[
-            :OTHER_SMALLEST_SETS_COUNT
-        ]
+        yield from sorted(range(1, len(fewest)), key=lambda k: bound_modes(robots[k], at))[:OTHER_SMALLEST_SETS_COUNT]
 
     for k in tried():
         found = [

@@ -21,7 +21,7 @@ from ..geometry.loci import Plane, Sphere
 from ..geometry.so3 import convert_to_quaternions
 from ..geometry.vectors import Array
 from ..solving.newton import approach_zeros
-from ..solving.platform.pose_coordinate_solver import by_homotopy
+from ..solving.platform.pose_coordinate_solver import propose_by_homotopy
 from ..solving.platform.quadrics import COORDINATE_BITS_COUNT, PoseSystem
 from ..solving.platform.rigid import Spatial
 from .closures import write_numbers
@@ -175,7 +175,7 @@ def _first(record: dict[str, Any], E: Array) -> Any:
         np.array(rational(record["hub"]), dtype=float),
     )
     part = PoseSystem(tuple(range(len(curves))), system.chart(0), True)
-    found = by_homotopy(part, None)
+    found = propose_by_homotopy(part, None)
     assert part.chart.study is not None
     frame = part.chart.frame
     x = np.array([[1.0, *(complex(v) for v in each)] for each, _ in found.solutions]).reshape(-1, 8)

@@ -10,7 +10,7 @@ import numpy as np
 from ..geometry.loci import Circle, Line, Point, Reach, Sphere
 from ..geometry.so3 import convert_to_quaternions
 from ..geometry.vectors import cross, normalise_vector
-from ..solving.platform.quadrics import UNIT, RoundedConic, WorkingFrame, direction, spokes
+from ..solving.platform.quadrics import UNIT, RoundedConic, WorkingFrame, build_spokes, convert_direction
 from .closures import round_numbers, write_numbers
 from .verify_certificate import dot
 
@@ -30,13 +30,13 @@ def reach_record(reach: Reach, frame: WorkingFrame, turn: float) -> dict[str, An
     if isinstance(reach, Circle):
         return {"circle": write_numbers([centre, *_spokes(reach, frame, turn)])}
     rest = [] if isinstance(reach, Point) else [reach.direction if isinstance(reach, Line) else reach.normal]
-    exact = [[Fraction(int(x), UNIT) for x in direction(each, frame, RoundedConic)] for each in rest]
+    exact = [[Fraction(int(x), UNIT) for x in convert_direction(each, frame, RoundedConic)] for each in rest]
     return {type(reach).__name__.lower(): write_numbers([centre, *exact])}
 
 
 def _spokes(circle: Circle, frame: WorkingFrame, turn: float) -> list[list[Fraction]]:
     """Two spokes of a circle, exactly normal to each other and of one length: those of a rational rotation."""
-    given = spokes(circle, frame, turn, RoundedConic)
+    given = build_spokes(circle, frame, turn, RoundedConic)
     a, b = ([Fraction(int(x), UNIT) for x in each] for each in given)
     if len(a) == 2 or dot(a, b) == 0 == dot(a, a) - dot(b, b):
         return [a, b]

@@ -15,7 +15,7 @@ from ..solving.platform.quadrics import PoseSystem, WorkingFrame
 from ..solving.platform.rigid import Planar, Spatial
 from ..solving.platform.solve import SquareSolution
 from ..solving.platform.square_systems import TURNS, SquareSystem
-from ..solving.platform.translating import ArticulatedPlatform, TranslatingPlatform, is_coplanar, met_normal
+from ..solving.platform.translating import ArticulatedPlatform, TranslatingPlatform, find_met_normal, is_coplanar
 from .closures import ClosedRobot, round_numbers, write_numbers
 from .poses import regular
 from .proposed import ProposedRecord, placed_in, starts_of
@@ -176,4 +176,4 @@ def _meeting_surface(curve: Curve, other: Reach, size: float) -> Reach:
     """The surface that a curve is met with: of a curve of its plane its sphere, or a plane through it."""
     if isinstance(other, Circle) and is_coplanar(curve, other, size):
         return Sphere(other.centre, other.radius)
-    return other if isinstance(other, Sphere | Plane) else Plane(other.centre, met_normal(curve, other))
+    return other if isinstance(other, Sphere | Plane) else Plane(other.centre, find_met_normal(curve, other))

@@ -77,17 +77,19 @@ def descend_together(
     """As :func:`descend`, of several starts that know nothing of each other, in step: ``evaluate`` and ``advance`` are
     given those of each number that still descend."""
     x = dict(enumerate(starts))
-    found = {i: Residual.of(*each) for i, each in zip(x, evaluate(x), strict=True)}
+    residuals = {i: Residual.of(*values) for i, values in zip(x, evaluate(x), strict=True)}
     factor = dict.fromkeys(x, damping.start)
     for _ in range(iterations):
-        going = {i: (x[i], at, factor[i]) for i, at in found.items() if not (content(at) or factor[i] > damping.most)}
+        going = {
+            i: (x[i], at, factor[i]) for i, at in residuals.items() if not (content(at) or factor[i] > damping.most)
+        }
         if not going:
             break
-        there = {i: place for i, place in advance(going).items() if place is not None}
-        trial = {i: Residual.of(*each) for i, each in zip(there, evaluate(there), strict=True)} if there else {}
+        steps = {i: place for i, place in advance(going).items() if place is not None}
+        trial = {i: Residual.of(*values) for i, values in zip(steps, evaluate(steps), strict=True)} if steps else {}
         for i, (_, at, used) in going.items():
             if i in trial and trial[i].size < at.size:
-                x[i], found[i], factor[i] = there[i], trial[i], max(damping.eased * used, damping.least)
+                x[i], residuals[i], factor[i] = steps[i], trial[i], max(damping.eased * used, damping.least)
             else:
                 factor[i] = 10.0 * used
-    return ((x[i], found[i]) for i in x)
+    return ((x[i], residuals[i]) for i in x)

@@ -11,7 +11,7 @@ from analysis.modes.draws import FAMILIES, MEETING, SURFACES, Draw
 from hrsynth.errors import MissingExtra
 from hrsynth.geometry.vectors import Array
 from hrsynth.solving.platform.constrained_platform import System
-from hrsynth.solving.platform.msolve import executable
+from hrsynth.solving.platform.msolve import find_executable
 from hrsynth.solving.platform.solve import SystemModes, solve, solve_by_msolve
 
 EVERY = FAMILIES | MEETING | SURFACES
@@ -20,7 +20,7 @@ EVERY = FAMILIES | MEETING | SURFACES
 def installed() -> bool:
     """Whether msolve is."""
     try:
-        executable()
+        find_executable()
     except MissingExtra:
         return False
     return True

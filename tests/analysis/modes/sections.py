@@ -18,7 +18,7 @@ import numpy as np
 from flint import nmod_mat
 
 from hrsynth.geometry.loci import Circle, Line, Plane, Sphere
-from hrsynth.solving.platform.quadrics import normals
+from hrsynth.solving.platform.quadrics import list_normals
 from hrsynth.solving.platform.rigid import Spatial
 
 PRIME = 2147483629
@@ -34,7 +34,7 @@ def rows(system: Spatial) -> list[list[Fraction]]:
     for k, (reach, tip) in enumerate(zip(system.curves, system.tips, strict=True)):
         arrow = k >= len(system.points)
         b, c, hub = _exact(tip), _exact(reach.centre), _exact(system.hub)
-        for n in normals(reach) if isinstance(reach, Circle | Line | Plane) else ():
+        for n in list_normals(reach) if isinstance(reach, Circle | Line | Plane) else ():
             a = _exact(n)
             offset = [x - h * arrow for x, h in zip(c, hub, strict=True)]
             # a · (p + R b − centre) = 0, times h

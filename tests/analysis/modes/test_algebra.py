@@ -10,7 +10,7 @@ from flint import arb, ctx
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.loci import Circle, Curve, Line, Point
 from hrsynth.solving.krawczyk import enclose_zero
-from hrsynth.solving.platform.polynomials import Equation, cycle, pair
+from hrsynth.solving.platform.polynomials import Equation, eliminate_cycle, pair
 from hrsynth.solving.platform.rigid import Planar, Spatial
 
 x, y, z = sympy.symbols("x y z")
@@ -37,7 +37,7 @@ def test_eliminants_are_resultants(seed: int):
     f, g, h = table(rng), table(rng), table(rng)
     assert proportional(pair(f, g).polynomial, sympy.resultant(polynomial(f, x, y), polynomial(g, x, y), y))
     inner = sympy.expand(sympy.resultant(polynomial(f, x, y), polynomial(g, y, z), y))
-    assert proportional(cycle(f, g, h).polynomial, sympy.resultant(inner, polynomial(h, z, x), z))
+    assert proportional(eliminate_cycle(f, g, h).polynomial, sympy.resultant(inner, polynomial(h, z, x), z))
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -45,7 +45,7 @@ def test_the_other_unknowns_solve_all_equations(seed: int):
     rng = np.random.default_rng(seed)
     f, g, h = table(rng), table(rng), table(rng)
     with ctx.workprec(200):
-        eliminant = cycle(f, g, h)
+        eliminant = eliminate_cycle(f, g, h)
         roots = eliminant.polynomial.complex_roots()
         assert len(roots) == 16
         for u, _ in roots:

@@ -7,7 +7,7 @@ import pytest
 
 from analysis.modes.drives import closings, driven
 from analysis.modes.pods import displacements, pods
-from hrsynth.analysis.loci.loci_from_joints import reaches
+from hrsynth.analysis.loci.loci_from_joints import derive_reaches
 from hrsynth.analysis.loci.locked_chain import Chain, ChainBody, LocusDerivationFailure
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.catalog.architecture_key import parse
@@ -143,15 +143,15 @@ def offset_u(offset: float) -> Chain:
 
 def test_an_offset_parts_the_two_lines_of_a_u():
     """None: one line; a millimetre: two, which the other solution of the direction parts; between: no answer."""
-    assert len(reaches(offset_u(0.0))[0]) == 1
+    assert len(derive_reaches(offset_u(0.0))[0]) == 1
     for offset in (1e-3, 0.1):
-        (one, gain), (other, more) = reaches(offset_u(offset))[0]
+        (one, gain), (other, more) = derive_reaches(offset_u(offset))[0]
         assert isinstance(one, Line)
         assert isinstance(other, Line)
         assert gain == 1.0 < more
         assert 1e-3 * offset < np.linalg.norm(one.miss(other.centre)) < 3 * offset
     with pytest.raises(LocusDerivationFailure, match="differ by only"):
-        reaches(offset_u(1e-8))
+        derive_reaches(offset_u(1e-8))
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ import pytest
 import hrsynth
 from analysis.modes.laws import needs_msolve
 from hrsynth.description import list_robots, load
-from hrsynth.solving.platform.modular_root_bound import combine_quadrics, most_zeros
+from hrsynth.solving.platform.modular_root_bound import bound_zeros, combine_quadrics
 from hrsynth.solving.platform.polynomials import Quadric
 from strategies import random_rotation, transformed
 
@@ -33,23 +33,23 @@ def sphere(centre, squared):
 @pytest.mark.parametrize("n", [1, 2, 3])
 @pytest.mark.parametrize("seed", range(3))
 def test_products_of_planes_meet_in_as_many_points_as_can_be_picked(n, seed):
-    assert most_zeros(pairs_of_planes(np.random.default_rng(seed), n), 2**n) == 2**n
+    assert bound_zeros(pairs_of_planes(np.random.default_rng(seed), n), 2**n) == 2**n
 
 
 @pytest.mark.parametrize("n", [2, 3])
 def test_spheres_meet_in_two_points_though_all_hold_one_conic_at_infinity(n):
     rng = np.random.default_rng(n)
     spheres = [sphere(rng.integers(-HEIGHT, HEIGHT, size=n), int(rng.integers(1, HEIGHT))) for _ in range(n)]
-    assert most_zeros(spheres, 2) == 2
+    assert bound_zeros(spheres, 2) == 2
 
 
 def test_what_holds_a_curve_has_no_bound():
     one, other = pairs_of_planes(np.random.default_rng(4), 2)
-    assert most_zeros([one, Quadric(3 * one.A)], 1) is None
+    assert bound_zeros([one, Quadric(3 * one.A)], 1) is None
     a = np.array([1, 2, -3], dtype=object)
     both = [Quadric(np.outer(a, row)) for row in np.array([[1, 5, 7], [2, -1, 4]], dtype=object)]
-    assert most_zeros(both, 1) is None
-    assert most_zeros([one, other], 3) == 4
+    assert bound_zeros(both, 1) is None
+    assert bound_zeros([one, other], 3) == 4
 
 
 def test_combinations_have_the_same_zeros():

@@ -13,7 +13,7 @@ from scipy.optimize import minimize_scalar
 import hrsynth
 from description.foreign.rounded import exported, of_hinges
 from hrsynth.analysis.modes.modes import AssemblyModes
-from hrsynth.analysis.modes.near_modes import descend, measurement_bound
+from hrsynth.analysis.modes.near_modes import descend, parse_measurement_bound
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.pose_requests import solve_configurations
 from hrsynth.description import list_robots, load
@@ -101,7 +101,7 @@ def test_the_bound_is_that_of_the_measurement(cad: Mechanism):
     assert len(hrsynth.modes(cad, cone=1.1 * near.angle).near_modes) == 1
     for wrong in ("-1deg", "far", 2.0, -0.1):
         with pytest.raises(BadRequest):
-            measurement_bound(wrong)
+            parse_measurement_bound(wrong)
 
 
 def test_every_answer_counts_it(cad: Mechanism):
@@ -122,7 +122,7 @@ def test_a_search_finds_what_a_list_proposes(cad: Mechanism, monkeypatch: pytest
     def refuse(*_: object) -> None:
         raise UnsupportedLocus("delta", "no list is to be made")
 
-    monkeypatch.setattr("hrsynth.analysis.modes.modes._modes_by_system", refuse)
+    monkeypatch.setattr("hrsynth.analysis.modes.modes._list_by_system", refuse)
     hrsynth.clear_cache()
     (met,) = hrsynth.modes(cad).near_modes
     assert met.stable

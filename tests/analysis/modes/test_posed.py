@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hrsynth.analysis.loci.tips import tip_loci
+from hrsynth.analysis.loci.tips import derive_tip_loci
 from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.modes.branches import solve_all
-from hrsynth.analysis.modes.condition_modes import pose_platform, solve_posed
+from hrsynth.analysis.modes.condition_modes import build_posed_platforms, solve_posed
 from hrsynth.analysis.modes.mode_search import search
 from hrsynth.analysis.modes.modes import modes
 from hrsynth.analysis.pose_requests import observe
@@ -18,7 +18,7 @@ from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.geometry import build_mechanism
 from hrsynth.constraints.pattern import list_leg_ends
 from hrsynth.geometry.vectors import compare_poses
-from hrsynth.solving.platform.pose_bound import _Quotient, bound, dimensions
+from hrsynth.solving.platform.pose_bound import _Quotient, bound, compute_dimensions
 from hrsynth.solving.platform.pose_conditions import (
     AtAngle,
     Coplanar,
@@ -102,7 +102,9 @@ def test_what_random_starts_find_is_listed(word, legs, count):
 def test_the_known_ways_list_the_same(word, legs, seed):
     robot = measured(word, legs, seed)
     at = robot.setup.configurations[1]
-    made, known = solve_all(tip_loci(robot.setup.decomposition, robot.observation_model, robot.pattern, at), near=False)
+    made, known = solve_all(
+        derive_tip_loci(robot.setup.decomposition, robot.observation_model, robot.pattern, at), near=False
+    )
     other, found = solve_posed(robot, at)
     assert known.complete
     assert found.complete
@@ -116,7 +118,7 @@ def test_the_known_ways_list_the_same(word, legs, seed):
 def test_each_pose_is_within_its_radius_of_one_that_fits_all_legs():
     robot = measured(*KINDS[0][:2])
     at = robot.setup.configurations[1]
-    (system,) = pose_platform(robot, at)
+    (system,) = build_posed_platforms(robot, at)
     made, found = solve_posed(robot, at)
     (body,) = list_leg_ends(robot.setup.decomposition)
     home = np.linalg.inv(at.pose(body))
@@ -215,10 +217,10 @@ def test_ranks_modulo_one_condition_are_those_modulo_all(kinds, monkeypatch):
     for t in (forms.degree - 2, forms.degree):
         assert _Quotient.of(forms, t) is not None
         most = min(2, t // 2 - 1)
-        found = dimensions(forms, t, most)
+        found = compute_dimensions(forms, t, most)
         with monkeypatch.context() as without:
             without.setattr(_Quotient, "of", lambda *asked: None)
-            assert dimensions(forms, t, most) == found
+            assert compute_dimensions(forms, t, most) == found
 
 
 @pytest.mark.slow

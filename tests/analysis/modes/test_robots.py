@@ -17,7 +17,7 @@ from hrsynth.analysis.modes.branches import MODES_TIME_LIMIT_S, Model
 from hrsynth.analysis.modes.condition_modes import solve_posed
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.analysis.modes.natural_modes import solve_natural
-from hrsynth.analysis.modes.tip_modes import solve_tips, without_couplings
+from hrsynth.analysis.modes.tip_modes import drop_couplings, solve_tips
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.pose_requests import observe as watched
 from hrsynth.description import list_robots, load
@@ -352,10 +352,7 @@ def test_couplings_in_space_rule_poses_out(name: str, one: str, other: str, rati
     """Lists are those of the robot without them, with the tied motor held; closings with them are among these."""
     robot = load(list_robots()[name])
     ends = [robot.joints[joint] for joint in (one, other)]
-    coupled = robot.changed(
-        joints=[replace(ends[1], motor=None)],
-        couplings=(Coupling("gear", one, other, ratio),),
-    )
+    coupled = robot.changed(joints=[replace(ends[1], motor=None)], couplings=(Coupling("gear", one, other, ratio),))
     found, free = modes(coupled, real=real), modes(robot, real=real)
     assert found.found.complex == free.found.complex
     assert found.found.proof == f"without couplings, which only exclude poses: {free.found.proof}"
@@ -440,8 +437,8 @@ def test_a_joint_that_a_coupling_holds_apart_from_another_is_no_joint_without_it
     )
     setup = watched(coupled)
     assert stage in setup.mechanism.links
-    assert without_couplings(MeasuredRobot.of(setup, real=True), setup.all_samples.start) is None
-    assert without_couplings(MeasuredRobot.of(setup), setup.all_samples.start) is not None
+    assert drop_couplings(MeasuredRobot.of(setup, real=True), setup.all_samples.start) is None
+    assert drop_couplings(MeasuredRobot.of(setup), setup.all_samples.start) is not None
 
 
 def moved_since_zero(found: AssemblyModes, at: ClosedConfiguration, joint: Joint) -> float:

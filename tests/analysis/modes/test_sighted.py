@@ -18,7 +18,7 @@ from analysis.modes.test_posed import distance
 from analysis.modes.watched import free_body, watched, written
 from analysis.test_sensors import arm
 from hrsynth.analysis.loci.leg_conditions import OriginAndUnit
-from hrsynth.analysis.loci.observation_loci import PlatformObservation, conditions
+from hrsynth.analysis.loci.observation_loci import PlatformObservation, list_plane_conditions
 from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.modes.mode_search import search
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
@@ -90,7 +90,7 @@ def test_what_a_held_value_leaves_is_what_it_transmits(kind: type, back: bool) -
         wrenches = np.array(seen.wrenches(at), dtype=float)  # type: ignore[attr-defined]
         sight = PlatformObservation(seen, "l", seen.loci(at), back)  # type: ignore[attr-defined]
         for turned in (False, True):
-            found = conditions([sight], OriginAndUnit(np.zeros(3), 1.0), turned)
+            found = list_plane_conditions([sight], OriginAndUnit(np.zeros(3), 1.0), turned)
             assert max(abs(float(c.value(c.b, c.c, np.asarray))) for c in found) < 1e-9
             rates = np.array([c.rates for c in found])
             ranks = [np.linalg.matrix_rank(each, tol=1e-7) for each in (wrenches, rates, np.vstack([wrenches, rates]))]

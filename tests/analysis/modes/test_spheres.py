@@ -17,9 +17,9 @@ from analysis.modes.test_meant import CLASSES
 from hrsynth.description import list_robots, load
 from hrsynth.geometry.loci import Circle, Plane, Point, Sphere
 from hrsynth.geometry.vectors import build_pose, normalise_vector, rotate_about_axis
-from hrsynth.solving.platform.homotopy import section
+from hrsynth.solving.platform.homotopy import make_section
 from hrsynth.solving.platform.rigid import Spatial
-from hrsynth.solving.platform.root_bound import degree_bound, least_bound
+from hrsynth.solving.platform.root_bound import compute_degree_bound, find_least_bound
 from hrsynth.solving.platform.solve import SystemModes, solve
 from strategies import random_rotation
 
@@ -100,8 +100,8 @@ def test_poses_are_of_degree_forty():
 
 def test_the_kept_section_is_six_conditions_on_poses():
     """Its quadrics are those of the forms of h, M, y, x, r: they vanish on no pose at random, but on combinations."""
-    assert section().shape == (7, 8, 8)
-    assert np.linalg.matrix_rank(section().reshape(7, -1)) == 7
+    assert make_section().shape == (7, 8, 8)
+    assert np.linalg.matrix_rank(make_section().reshape(7, -1)) == 7
 
 
 def test_all_forty_poses_of_dietmaiers_platform_are_real():
@@ -197,7 +197,7 @@ def test_no_bound_is_lower_than_what_is_found():
             system, _ = six_rods(rng, platform, base)
             if len(set(zip(platform, base, strict=True))) == 6:
                 found = solve(system, near=False)
-                least = least_bound(system, range(6))
+                least = find_least_bound(system, range(6))
                 assert least is not None
                 assert found.complex is not None
                 assert found.complex <= least.most, (platform, base)
@@ -264,4 +264,4 @@ def test_planes_alone_leave_eight_and_double_points_count_none():
     system, _ = spatial(np.random.default_rng(5), "EEEEEE")
     assert all(isinstance(curve, Plane) for curve in system.curves)
     assert solve(system, near=False).complex == 8
-    assert degree_bound(system, range(6)).most == 40
+    assert compute_degree_bound(system, range(6)).most == 40

@@ -19,7 +19,7 @@ from hrsynth.geometry.vectors import normalise_vector, rotate_about_axis
 from hrsynth.solving.platform.constrained_platform import System
 from hrsynth.solving.platform.msolve import parametrise, read, write_system
 from hrsynth.solving.platform.polynomials import Quadric
-from hrsynth.solving.platform.pose_coordinate_solver import wholes
+from hrsynth.solving.platform.pose_coordinate_solver import list_parts
 from hrsynth.solving.platform.quadrics import Balls
 from hrsynth.solving.platform.rigid import Planar
 from hrsynth.solving.platform.solve import solve, solve_by_msolve
@@ -169,7 +169,7 @@ def test_a_tip_misses_a_surface_by_its_distance(surface: Reach):
 )
 def test_the_goal_satisfies_the_quadrics(family: str):
     system, goal = draw(family, 3)
-    for part in wholes(system, number=2):
+    for part in list_parts(system, number=2):
         x = coordinates(system, part.chart, goal)
         values = [float(each.value(x)) for each in part.equations()]
         scales = [float(np.abs(each.A).sum()) for each in part.equations()]
@@ -214,7 +214,7 @@ def test_msolve_is_asked_and_read_in_its_own_words():
 
 @needs_msolve
 def test_msolve_stops_in_time():
-    part = next(wholes(spatial(np.random.default_rng(0), "SSSSSS").system))
+    part = next(list_parts(spatial(np.random.default_rng(0), "SSSSSS").system))
     with pytest.raises(ExternalSolverFailure, match="no answer within"):
         parametrise(part.equations(), timeout=0.05)
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from analysis.modes.laws import needs_msolve
-from hrsynth.analysis.loci.tips import tip_loci
-from hrsynth.analysis.modes.branches import model
+from hrsynth.analysis.loci.tips import derive_tip_loci
+from hrsynth.analysis.modes.branches import build_model
 from hrsynth.analysis.observed import ObservedRobot, build_motor_model
 from hrsynth.constraints.pattern import recognise
 from hrsynth.description import list_robots, load
@@ -58,7 +58,7 @@ def confined(name: str, *, real: bool = False, member: int = 1):
     observation_model = build_motor_model(setup) if real else setup.samples.observation_model
     configurations = [each.configuration for each in setup.samples.members]
     pattern = recognise(setup.decomposition, observation_model, configurations)
-    return tip_loci(setup.decomposition, observation_model, pattern, configurations[member])
+    return derive_tip_loci(setup.decomposition, observation_model, pattern, configurations[member])
 
 
 def missed(found) -> float:
@@ -134,7 +134,7 @@ def test_real_robots_have_their_known_number_of_modes(name: str, complex_count: 
 
 def check_real_robot(name: str, complex_count: int) -> None:
     """Complete, of that number, and the pose itself among them."""
-    system = model(confined(name, real=True))
+    system = build_model(confined(name, real=True))
     modes = solve(system.system)
     assert modes.complete
     assert modes.complex == complex_count

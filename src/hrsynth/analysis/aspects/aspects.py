@@ -22,7 +22,7 @@ from ...records import FLAT, As, Recorded, Shown, recorded
 from ...results import Result, Value
 from ...tolerances import HIDDEN_ROBOT_RESIDUAL_TOL
 from ..analysis_declaration import analysis
-from ..modes.modes import AssemblyModes, at_mode, modes
+from ..modes.modes import AssemblyModes, assemble_at_mode, modes
 from ..observation_inputs import CameraLike, LegsLike, Seed, SensorLike
 from ..observed import ObservedRobot, RobotLike
 from .path import PATH_INTERVALS_MAX, PathAnswer, PathPlanner
@@ -155,13 +155,7 @@ class AspectTable(Result, shown_as="aspects"):
     )
 
 
-@analysis(
-    80,
-    examples=(
-        "quattro --observe 1,4",
-        "3rrr_m1 --observe 2,1,3 -o aspects.png",
-    ),
-)
+@analysis(80, examples=("quattro --observe 1,4", "3rrr_m1 --observe 2,1,3 -o aspects.png"))
 def aspects(
     robot: RobotLike,
     observe: LegsLike = None,
@@ -235,7 +229,7 @@ def aspects(
 
 def _place(listed: AssemblyModes, number: int) -> ClosedConfiguration | None:
     try:
-        return at_mode(listed, ModeNumber(number))
+        return assemble_at_mode(listed, ModeNumber(number))
     except PoseReachFailure:
         return None
 

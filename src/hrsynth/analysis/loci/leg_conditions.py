@@ -35,9 +35,9 @@ from ...solving.platform.pose_conditions import (
 )
 from ...tolerances import CHAIN_ROUNDING, POINT_DISTANCE_TOL, RELATION_ANGLE_TOL
 from ..measured import MeasuredRobot
-from .leg_orientations import Known, groups, one_axis, orientations, two_axes
-from .loci_from_joints import apart, place
-from .locked_chain import Chain, ChainBody, LocusDerivationFailure, chain
+from .leg_orientations import Known, find_one_axis, find_two_axes, group_axes, list_orientations
+from .loci_from_joints import compare_reaches, place
+from .locked_chain import Chain, ChainBody, LocusDerivationFailure, build_chain
 
 Branches = list[list[PoseCondition]]
 _Read = tuple[Branches, float]
@@ -57,7 +57,7 @@ class OriginAndUnit:
         return np.asarray((at - self.origin) / self.size)
 
 
-def rigid_platform(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[str, OriginAndUnit]:
+def require_rigid_platform(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[str, OriginAndUnit]:
     """The one body on which all legs end, and lengths from where it is at the goal. Raises ``UnsupportedLocus``."""
     decomposition = measured.setup.decomposition
     bodies = list_leg_ends(decomposition)
@@ -68,7 +68,7 @@ def rigid_platform(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[
     return bodies[0], OriginAndUnit(goal.pose(bodies[0])[:3, 3], goal.model.length)
 
 
-def leg_conditions(
+def list_leg_conditions(
     decomposition: LegDecomposition,
     leg: Leg,
     observation_model: ObservationModel,
@@ -80,33 +80,33 @@ def leg_conditions(
     """Return all leg solutions of the conditions of a locked leg on the platform, the goal's own first; and how far its
     geometry was moved (m). ``plane``: the normal of a motion in a plane; ``kept``: True if the platform does not
     rotate. Raises ``UnsupportedLocus``."""
-    own = [o for o in observation_model.observations if o.leg == leg.label]
-    twists = compute_leg_twists(goal, leg, own, observation_model.reference)
+    observed = [o for o in observation_model.observations if o.leg == leg.label]
+    twists = compute_leg_twists(goal, leg, observed, observation_model.reference)
     count = (6 if plane is None else 3) - twists.shape[1]
     if kept:
         count = 3 - twists.shape[1] + compute_range_basis(twists[3:], 1.0)[1].value
     if count <= 0:
         return [[]], 0.0
     path = decomposition.path(leg)
-    rods = _Rods.of(decomposition, path[-1], own, goal)
+    rods = _Rods.of(decomposition, path[-1], observed, goal)
     reasons = []
-    for tip in _tips(decomposition, path, goal) if rods is None else (rods.tip,):
+    for tip in _list_tips(decomposition, path, goal) if rods is None else (rods.tip,):
         try:
-            found = chain(decomposition, leg, own, goal, tip, "free")
+            chain = build_chain(decomposition, leg, observed, goal, tip, "free")
             ways: list[tuple[_Reading, Chain]] = [
-                (partial(_of_tip, rods=rods), found),
-                (_of_foot, found),
-                (_in_plane, found),
+                (partial(_restrict_tip, rods=rods), chain),
+                (_restrict_foot, chain),
+                (_read_in_plane, chain),
             ]
             if kept:
-                ways = [(_of_tip, replace(found, kept=True))]
+                ways = [(_restrict_tip, replace(chain, kept=True))]
             elif plane is not None:
-                bodies = (*found.bodies, ChainBody(plane, tip))
-                ways = [(_of_tip, replace(found, bodies=bodies, kept=True)), (_of_foot, found)]
-            for read, each in ways:
+                bodies = (*chain.bodies, ChainBody(plane, tip))
+                ways = [(_restrict_tip, replace(chain, bodies=bodies, kept=True)), (_restrict_foot, chain)]
+            for read, part in ways:
                 try:
-                    branches, radii = read(leg.label, each, count, tip, middle, plane)
-                    return branches, found.moved + (radii if radii > CHAIN_ROUNDING * found.extent else 0.0)
+                    branches, radii = read(leg.label, part, count, tip, middle, plane)
+                    return branches, chain.moved + (radii if radii > CHAIN_ROUNDING * chain.extent else 0.0)
                 except LocusDerivationFailure as error:
                     reasons.append(str(error))
         except LocusDerivationFailure as error:
@@ -117,17 +117,17 @@ def leg_conditions(
     )
 
 
-def _tips(decomposition: LegDecomposition, path: Sequence[WordEdge], goal: ClosedConfiguration) -> Iterator[Array]:
+def _list_tips(decomposition: LegDecomposition, path: Sequence[WordEdge], goal: ClosedConfiguration) -> Iterator[Array]:
     """The centre of the last joint (m), and where its axis meets those of other joints: about these a leg turns."""
     joints = [decomposition.mechanism.joints[name] for edge in path for name in edge.joints]
     *others, (end, axes) = (carry_joint(decomposition.mechanism, joint, goal.pose) for joint in joints)
     yield end
     if joints[-1].type is JointType.REVOLUTE:
         met = (
-            lines.find_meeting_point([(end, axes[0]), (at, each)], POINT_DISTANCE_TOL * goal.model.length)
-            for at, own in others
-            for each in own
-            if not lines.is_parallel(axes[0], each)
+            lines.find_meeting_point([(end, axes[0]), (at, axis)], POINT_DISTANCE_TOL * goal.model.length)
+            for at, directions in others
+            for axis in directions
+            if not lines.is_parallel(axes[0], axis)
         )
         yield from (at for at in met if at is not None)
 
@@ -148,7 +148,7 @@ class _Rods:
         """Return the rods of the last part of a leg, if it is of such rods."""
         if not isinstance(edge.word.items[0], Rods) or len(edge.joints) < 4:
             return None
-        watched = {each.link for each in own if isinstance(each, Direction)}
+        watched = {o.link for o in own if isinstance(o, Direction)}
         number = next((k for k, link in enumerate(edge.inside) if link in watched), 0)
         ends = [
             [
@@ -182,7 +182,7 @@ class _Rods:
         ]
 
 
-def _of_tip(
+def _restrict_tip(
     leg: str,
     found: Chain,
     count: int,
@@ -194,7 +194,7 @@ def _of_tip(
     """A tip that is confined, and angles that are kept."""
     seen: list[tuple[Reach | Quadrics, list[tuple[Array, Array, float]]]] = []
     moved = 0.0
-    for known, _ in orientations(found):
+    for known, _ in list_orientations(found):
         reach, radii = place(found, known)
         moved = max(moved, radii)
         turns: list[tuple[Array, Array, float]] = []
@@ -202,28 +202,29 @@ def _of_tip(
         if rods is not None and missing == len(rods.across):
             turns = rods.turns(found, known)
         elif missing == 1:
-            turns = [_angle(reach, *two_axes(found, known))]
+            turns = [_keep_angle(reach, *find_two_axes(found, known))]
         elif missing == 2:
-            d, c = one_axis(found, known)
+            d, c = find_one_axis(found, known)
             turns = [*((a, c, 0.0) for a in build_plane_axes(d)), (d, c, 1.0)]
         elif missing:
             raise LocusDerivationFailure(f"{missing} conditions on the platform's rotation")
         if not any(
-            _is_same_locus(reach, other, found.length) and _has_same_rotations(turns, others) for other, others in seen
+            _is_same_locus(reach, known_reach, found.length) and _has_same_rotations(turns, others)
+            for known_reach, others in seen
         ):
             seen.append((reach, turns))
     b = middle.point(tip)
     return [
-        [*_reach_conditions(leg, reach, tip, middle, plane), *(AtAngle(leg, b, c, a, h) for a, c, h in turns)]
+        [*_list_reach_conditions(leg, reach, tip, middle, plane), *(AtAngle(leg, b, c, a, h) for a, c, h in turns)]
         for reach, turns in seen
     ], moved
 
 
 def _is_same_locus(one: Reach | Quadrics, other: Reach | Quadrics, length: float) -> bool:
-    return apart(one, other, length) <= RELATION_ANGLE_TOL
+    return compare_reaches(one, other, length) <= RELATION_ANGLE_TOL
 
 
-def _angle(reach: Reach | Quadrics, a: Array, c: Array, own: Array) -> tuple[Array, Array, float]:
+def _keep_angle(reach: Reach | Quadrics, a: Array, c: Array, own: Array) -> tuple[Array, Array, float]:
     """a · R c = h, h that of the leg's own axes; a is exactly the direction of the tip's line where along that."""
     if isinstance(reach, Line) and lines.is_parallel(a, reach.direction):
         a = reach.direction * np.sign(a @ reach.direction)
@@ -241,54 +242,54 @@ def _has_same_rotations(one: list[tuple[Array, Array, float]], other: list[tuple
     )
 
 
-def _reach_conditions(
+def _list_reach_conditions(
     leg: str, reach: Reach | Quadrics, tip: Array, middle: OriginAndUnit, plane: Array | None
 ) -> list[PoseCondition]:
     """The conditions that a tip is within its reach."""
     b, none, o = middle.point(tip), np.zeros(3), middle.point(reach.centre)
     if plane is not None:
-        return _in_motion(leg, reach, b, o, plane, middle)
+        return _restrict_in_motion(leg, reach, b, o, plane, middle)
     flat: list[Array] = []
     if isinstance(reach, Point):
         flat = list(np.eye(3))
     elif isinstance(reach, Line):
-        flat = _across(reach.direction)
+        flat = _list_normals(reach.direction)
     elif isinstance(reach, Plane):
         flat = [reach.normal]
     elif isinstance(reach, Circle):
         flat = [reach.axis]
-    found: list[PoseCondition] = [OnPlane(leg, b, none, n, float(n @ o)) for n in flat]
+    conditions: list[PoseCondition] = [OnPlane(leg, b, none, n, float(n @ o)) for n in flat]
     if isinstance(reach, Circle | Sphere):
-        found.append(
+        conditions.append(
             OnRevolution(
                 leg, b, none, o, np.array([0.0, 0.0, 1.0]), np.array([(reach.radius / middle.size) ** 2, 0.0, -1.0])
             )
         )
     if isinstance(reach, Revolution):
-        found.append(OnRevolution(leg, b, none, o, reach.axis, _profile(reach, middle)))
+        conditions.append(OnRevolution(leg, b, none, o, reach.axis, _scale_profile(reach, middle)))
     if isinstance(reach, SweptCircle):
         r, s = (np.array(radius / middle.size) for radius in (reach.radius, reach.other))
-        found.append(
+        conditions.append(
             OnTwoCircles(leg, b, none, o, reach.axis, r, reach.direction, s)
             if reach.other
             else OnCylinder(leg, b, none, o, reach.axis, r, reach.direction)
         )
-    return found
+    return conditions
 
 
-def _across(d: Array) -> list[Array]:
+def _list_normals(d: Array) -> list[Array]:
     """Two vectors normal to d, exactly."""
     skip = int(np.argmax(np.abs(d)))
     return [np.cross(d, e) for k, e in enumerate(np.eye(3)) if k != skip]
 
 
-def _in_motion(
+def _restrict_in_motion(
     leg: str, reach: Reach | Quadrics, b: Array, o: Array, n: Array, middle: OriginAndUnit
 ) -> list[PoseCondition]:
     """Return the conditions in a plane with the normal n, at any height."""
     none = np.zeros(3)
     if isinstance(reach, Point):
-        return [OnPlane(leg, b, none, v, float(v @ o)) for v in _across(n)]
+        return [OnPlane(leg, b, none, v, float(v @ o)) for v in _list_normals(n)]
     if isinstance(reach, Line):
         v = np.cross(n, reach.direction)
         return [OnPlane(leg, b, none, v, float(v @ o))]
@@ -297,44 +298,44 @@ def _in_motion(
     raise LocusDerivationFailure(f"a {type(reach).__name__.lower()} in a plane")
 
 
-def _profile(reach: Revolution, middle: OriginAndUnit) -> Array:
+def _scale_profile(reach: Revolution, middle: OriginAndUnit) -> Array:
     return np.array(reach.profile) / [middle.size**2, middle.size, 1.0]
 
 
-def _of_foot(leg: str, found: Chain, count: int, tip: Array, middle: OriginAndUnit, plane: Array | None) -> _Read:
+def _restrict_foot(leg: str, found: Chain, count: int, tip: Array, middle: OriginAndUnit, plane: Array | None) -> _Read:
     """Return the conditions of a point of the base that is confined in the platform's frame, by the part after the last
     fixed link."""
     seen: list[tuple[Reach | Quadrics, Array]] = []
     moved = 0.0
-    for known, _ in orientations(found):
-        foot, rest = chain_from_platform(found, known)
-        for own, _ in orientations(rest):
-            reach, radii = place(rest, own)
+    for known, _ in list_orientations(found):
+        foot, rest = reverse_chain(found, known)
+        for turned, _ in list_orientations(rest):
+            reach, radii = place(rest, turned)
             moved = max(moved, radii)
             if (3 if plane is None else 2) - reach.freedoms != count:
                 raise LocusDerivationFailure("its proximal centre and its rotation of the platform")
             if not any(
-                _is_same_locus(reach, other, found.length)
+                _is_same_locus(reach, known_reach, found.length)
                 and np.linalg.norm(foot - at) <= RELATION_ANGLE_TOL * found.length
-                for other, at in seen
+                for known_reach, at in seen
             ):
                 seen.append((reach, foot))
-    return [_holds(leg, reach, foot, middle, plane) for reach, foot in seen], moved
+    return [_list_foot_conditions(leg, reach, foot, middle, plane) for reach, foot in seen], moved
 
 
-def _holds(
+def _list_foot_conditions(
     leg: str, reach: Reach | Quadrics, foot: Array, middle: OriginAndUnit, plane: Array | None
 ) -> list[PoseCondition]:
     o, b, none = middle.point(foot), middle.point(reach.centre), np.zeros(3)
     if isinstance(reach, Revolution):
-        return [OnMovingRevolution(leg, b, reach.axis, o, _profile(reach, middle))]
+        return [OnMovingRevolution(leg, b, reach.axis, o, _scale_profile(reach, middle))]
     if isinstance(reach, Plane):
         return [OnMovingPlane(leg, b, reach.normal, o, 0.0)]
     if isinstance(reach, Line):
-        across = _across(reach.direction) if plane is None else [np.cross(plane, reach.direction)]
+        across = _list_normals(reach.direction) if plane is None else [np.cross(plane, reach.direction)]
         return [OnMovingPlane(leg, b, n, o, 0.0) for n in across]
     if isinstance(reach, Circle) and plane is not None:
-        return _in_motion(leg, reach, b, o, plane, middle)
+        return _restrict_in_motion(leg, reach, b, o, plane, middle)
     if isinstance(reach, Circle | Sphere):
         ball = OnRevolution(
             leg, b, none, o, np.array([0.0, 0.0, 1.0]), np.array([(reach.radius / middle.size) ** 2, 0.0, -1.0])
@@ -343,7 +344,7 @@ def _holds(
     raise LocusDerivationFailure(f"a {type(reach).__name__.lower()} of the platform that contains its proximal centre")
 
 
-def chain_from_platform(found: Chain, known: Known) -> tuple[Array, Chain]:
+def reverse_chain(found: Chain, known: Known) -> tuple[Array, Chain]:
     """Return the proximal centre (m), the place of the part after the last link of known orientation, and the chain
     from the platform to it. Raises :class:`LocusDerivationFailure` if it contains an observation."""
     last = max(k for k, Q in enumerate(known) if Q is not None)
@@ -367,7 +368,7 @@ def chain_from_platform(found: Chain, known: Known) -> tuple[Array, Chain]:
     return foot, Chain(tuple(new), False, found.length, found.off)
 
 
-def _in_plane(leg: str, found: Chain, count: int, tip: Array, middle: OriginAndUnit, plane: Array | None) -> _Read:
+def _read_in_plane(leg: str, found: Chain, count: int, tip: Array, middle: OriginAndUnit, plane: Array | None) -> _Read:
     """An axis t through the proximal centre, axes n normal to it between which all is in a plane, and an axis c through
     the tip normal to those: t, the line to the tip and c are in one plane."""
     bodies = found.bodies
@@ -378,7 +379,7 @@ def _in_plane(leg: str, found: Chain, count: int, tip: Array, middle: OriginAndU
         or any(body.axis is None for body in bodies[1:])
     ):
         raise LocusDerivationFailure("another chain of axes")
-    parts = groups([(k, body.axis) for k, body in enumerate(found.bodies) if body.axis is not None])
+    parts = group_axes([(k, body.axis) for k, body in enumerate(found.bodies) if body.axis is not None])
     if [len(part) for part in parts] != [1, 2, 1]:
         raise LocusDerivationFailure("another chain of axes")
     (_, t), n, (_, c) = parts[0][0], parts[1][0][1], parts[2][0]

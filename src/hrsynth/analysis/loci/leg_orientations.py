@@ -29,23 +29,29 @@ Way = list[tuple[int, Array]]
 """Bodies met one after another, each with the axis about which it turns against the one before."""
 
 
-def orientations(chain: Chain) -> list[tuple[Known, float]]:
+def list_orientations(chain: Chain) -> list[tuple[Known, float]]:
     """All solutions for the bodies whose orientation is discrete, with their gains; the goal's own is the first."""
     known: list[Array | None] = [None] * len(chain.bodies)
     known[0] = np.eye(3)
     if chain.kept:
         known[-1] = np.eye(3)
-    return _settle(chain, tuple(known), 1.0)
+    return _resolve(chain, tuple(known), 1.0)
 
 
-def _settle(chain: Chain, known: Known, gain: float) -> list[tuple[Known, float]]:
-    for step in (_driven_bodies, _watched_once, _between_two, _watched_twice, _between_three):
-        for found in step(chain, known):
-            if any(known[k] is None for k in found.places) or not found.turns:
+def _resolve(chain: Chain, known: Known, gain: float) -> list[tuple[Known, float]]:
+    for step in (
+        _orient_driven,
+        _orient_watched_once,
+        _orient_between_two,
+        _orient_watched_twice,
+        _orient_between_three,
+    ):
+        for solved in step(chain, known):
+            if any(known[k] is None for k in solved.places) or not solved.turns:
                 return [
-                    each
-                    for turns, own in found.turns
-                    for each in _settle(chain, _with(known, found.places, turns), gain * own)
+                    solution
+                    for turns, factor in solved.turns
+                    for solution in _resolve(chain, _set_turns(known, solved.places, turns), gain * factor)
                 ]
     return [(known, gain)]
 
@@ -59,82 +65,82 @@ class _Found:
     turns: tuple[tuple[tuple[Array, ...], float], ...]
 
 
-def _with(known: Known, places: Sequence[int], turns: Sequence[Array]) -> Known:
+def _set_turns(known: Known, places: Sequence[int], turns: Sequence[Array]) -> Known:
     new = list(known)
     for k, Q in zip(places, turns, strict=True):
         new[k] = Q
     return tuple(new)
 
 
-def ways(chain: Chain, known: Known, k: int) -> Iterator[tuple[Array, Way]]:
+def list_ways(chain: Chain, known: Known, k: int) -> Iterator[tuple[Array, Way]]:
     """From the known bodies on either side of a body: that one's orientation, and the way to the body."""
     for step in (-1, 1):
-        at, found = k, Way()
+        at, way = k, Way()
         while at in range(len(known)) and known[at] is None:
             axis = chain.bodies[at if step < 0 else at + 1].axis if 0 <= at + (step > 0) < len(known) else None
             if axis is None:
                 break
-            found.append((at, axis))
+            way.append((at, axis))
             at += step
         else:
             Q = known[at] if at in range(len(known)) else None
             if Q is not None:
-                yield Q, found[::-1]
+                yield Q, way[::-1]
 
 
-def groups(way: Way) -> list[Way]:
+def group_axes(way: Way) -> list[Way]:
     """A way cut where the axis changes its direction."""
-    found: list[Way] = []
+    groups: list[Way] = []
     for place, axis in way:
-        if found and lines.is_parallel(found[-1][-1][1], axis):
-            found[-1].append((place, axis))
+        if groups and lines.is_parallel(groups[-1][-1][1], axis):
+            groups[-1].append((place, axis))
         else:
-            found.append([(place, axis)])
-    return found
+            groups.append([(place, axis)])
+    return groups
 
 
-def _held_directions(chain: Chain, known: Known) -> Iterator[tuple[Array, list[Way], Array]]:
+def _list_held_directions(chain: Chain, known: Known) -> Iterator[tuple[Array, list[Way], Array]]:
     """For each direction that is held in a body that may turn, or in a crank on one: ways to it, and the direction."""
     for k, body in enumerate(chain.bodies):
-        for Q, way in ways(chain, known, k):
+        for Q, way in list_ways(chain, known, k):
             if way:
-                yield from ((Q, groups(way), d) for d in body.watched)
+                yield from ((Q, group_axes(way), d) for d in body.watched)
             for crank in body.cranks:
-                yield from ((Q, groups([*way, (-1, crank.axis)]), d) for d in crank.watched)
+                yield from ((Q, group_axes([*way, (-1, crank.axis)]), d) for d in crank.watched)
 
 
-def kept_angle(chain: Chain) -> tuple[Array, Array]:
+def find_kept_angle(chain: Chain) -> tuple[Array, Array]:
     """Unit vectors a, fixed in the base, and c, of the chain's last body at the goal, whose angle the chain keeps:
     a · Q c = a · c, where all that turns the last body is axes along a, then axes along c.
 
     Raises :class:`LocusDerivationFailure` where other axes turn it too, or where a differs between branches.
     """
-    found = [two_axes(chain, known) for known, _ in orientations(chain)]
-    first = found[0]
-    if any(not _is_same_orientation(a, first[0]) for a, *_ in found):
+    pairs = [find_two_axes(chain, known) for known, _ in list_orientations(chain)]
+    first = pairs[0]
+    if any(not _is_same_orientation(a, first[0]) for a, *_ in pairs):
         raise LocusDerivationFailure("the axis with which its end keeps an angle differs between leg solutions")
     return first[:2]
 
 
-def two_axes(chain: Chain, known: Known) -> tuple[Array, Array, Array]:
+def find_two_axes(chain: Chain, known: Known) -> tuple[Array, Array, Array]:
     """The two directions about which the last body turns against what is known, or against a direction that is held in
     a body that spins about it: the first as it is fixed in the base, the second at the goal; and the first at the
     goal."""
-    base, parts = _turning(chain, known)
+    base, parts = _find_turning(chain, known)
     if len(parts) != 2:
         raise LocusDerivationFailure(f"{len(parts)} axes turn its end")
     return base @ parts[0][0][1], parts[1][0][1], parts[0][0][1]
 
 
-def one_axis(chain: Chain, known: Known) -> tuple[Array, Array]:
+def find_one_axis(chain: Chain, known: Known) -> tuple[Array, Array]:
     """The only direction about which the last body turns so, as it is fixed in the base, and at the goal."""
-    base, parts = _turning(chain, known)
+    base, parts = _find_turning(chain, known)
     if len(parts) != 1:
         raise LocusDerivationFailure(f"{len(parts)} axes turn its end")
     return base @ parts[0][0][1], parts[0][0][1]
 
 
-def _turning(chain: Chain, known: Known) -> tuple[Array, list[Way]]:
+def _find_turning(chain: Chain, known: Known) -> tuple[Array, list[Way]]:
     """The orientation from which on the last body turns, and about what."""
     axes, base = list[Array](), np.eye(3)
     for body, Q in zip(chain.bodies[::-1], known[::-1], strict=True):
@@ -146,10 +152,10 @@ def _turning(chain: Chain, known: Known) -> tuple[Array, list[Way]]:
         axes.append(body.watched[0] if body.axis is None else body.axis)
         if body.axis is None:
             break
-    return base, groups([(0, axis) for axis in axes[::-1]])
+    return base, group_axes([(0, axis) for axis in axes[::-1]])
 
 
-def _driven_bodies(chain: Chain, known: Known) -> Iterator[_Found]:
+def _orient_driven(chain: Chain, known: Known) -> Iterator[_Found]:
     """A body that a drive turns, on one of known orientation: as many solutions as the drive leaves angles."""
     for k, body in enumerate(chain.bodies):
         Q, axis = known[k - 1], body.axis
@@ -157,11 +163,11 @@ def _driven_bodies(chain: Chain, known: Known) -> Iterator[_Found]:
             yield _Found((k,), tuple(((Q @ rotate_about_axis(axis, angle),), gain) for angle, gain in body.angles))
 
 
-def _watched_once(chain: Chain, known: Known) -> Iterator[_Found]:
+def _orient_watched_once(chain: Chain, known: Known) -> Iterator[_Found]:
     """A direction held behind one axis keeps all bodies up to it from turning, where it is not along that axis."""
-    for Q, parts, d in _held_directions(chain, known):
+    for Q, parts, d in _list_held_directions(chain, known):
         if len(parts) == 1 and not lines.is_parallel(parts[0][0][1], d):
-            turn = _about(parts[0][0][1], d, Q.T @ d)
+            turn = _turn_about(parts[0][0][1], d, Q.T @ d)
             place = parts[0][-1][0]
             if turn is None:
                 yield _Found((), ())
@@ -169,11 +175,11 @@ def _watched_once(chain: Chain, known: Known) -> Iterator[_Found]:
                 yield _Found((place,), (((Q @ turn[0],), turn[1]),))
 
 
-def _watched_twice(chain: Chain, known: Known) -> Iterator[_Found]:
+def _orient_watched_twice(chain: Chain, known: Known) -> Iterator[_Found]:
     """A direction held behind two axes: two solutions."""
-    for Q, parts, d in _held_directions(chain, known):
+    for Q, parts, d in _list_held_directions(chain, known):
         if len(parts) == 2:
-            both = _cones(parts[0][0][1], parts[1][0][1], d, Q.T @ d)
+            both = _solve_cones(parts[0][0][1], parts[1][0][1], d, Q.T @ d)
             places = [part[-1][0] for part in parts]
             if both is not None:
                 keep = [n for n, place in enumerate(places) if place >= 0]
@@ -183,33 +189,33 @@ def _watched_twice(chain: Chain, known: Known) -> Iterator[_Found]:
                 )
 
 
-def _gaps(chain: Chain, known: Known) -> Iterator[tuple[Array, Array, list[Way]]]:
+def _list_gaps(chain: Chain, known: Known) -> Iterator[tuple[Array, Array, list[Way]]]:
     """Two known bodies with no known one between: their orientations, and the way in groups (none over a ball)."""
-    for one, other in pairwise([k for k, Q in enumerate(known) if Q is not None]):
-        axes = [chain.bodies[k].axis for k in range(one + 1, other + 1)]
-        Q, R = known[one], known[other]
+    for start, end in pairwise([k for k, Q in enumerate(known) if Q is not None]):
+        axes = [chain.bodies[k].axis for k in range(start + 1, end + 1)]
+        Q, R = known[start], known[end]
         if Q is not None and R is not None and all(axis is not None for axis in axes):
-            yield Q, R, groups([(one + 1 + n, axis) for n, axis in enumerate(axes) if axis is not None])
+            yield Q, R, group_axes([(start + 1 + n, axis) for n, axis in enumerate(axes) if axis is not None])
 
 
-def _between_two(chain: Chain, known: Known) -> Iterator[_Found]:
+def _orient_between_two(chain: Chain, known: Known) -> Iterator[_Found]:
     """One axis between two known bodies must be that of their turn; of two, each has one angle."""
-    for Q, R, parts in _gaps(chain, known):
+    for Q, R, parts in _list_gaps(chain, known):
         M = Q.T @ R
         if len(parts) == 1 and not _is_same_orientation(M @ parts[0][0][1], parts[0][0][1]):
             yield _Found((), ())
         elif len(parts) == 2:
             a, b = parts[0][0][1], parts[1][0][1]
-            turn = _about(a, b, M @ b)
+            turn = _turn_about(a, b, M @ b)
             yield _Found((parts[0][-1][0],), () if turn is None else (((Q @ turn[0],), turn[1]),))
 
 
-def _between_three(chain: Chain, known: Known) -> Iterator[_Found]:
+def _orient_between_three(chain: Chain, known: Known) -> Iterator[_Found]:
     """Three axes between two known bodies: two solutions."""
-    for Q, R, parts in _gaps(chain, known):
+    for Q, R, parts in _list_gaps(chain, known):
         if len(parts) == 3:
             a, b, c = (part[0][1] for part in parts)
-            both = _cones(a, b, c, Q.T @ R @ c)
+            both = _solve_cones(a, b, c, Q.T @ R @ c)
             if both is not None:
                 yield _Found(
                     (parts[0][-1][0], parts[1][-1][0]),
@@ -217,7 +223,7 @@ def _between_three(chain: Chain, known: Known) -> Iterator[_Found]:
                 )
 
 
-def _about(axis: Array, start: Array, end: Array) -> tuple[Array, float] | None:
+def _turn_about(axis: Array, start: Array, end: Array) -> tuple[Array, float] | None:
     """The turn about an axis that brings a unit vector to another, with its gain, or None.
 
     The angle is that of two vectors of length r normal to the axis, each off by at most 2 ε."""
@@ -229,7 +235,7 @@ def _about(axis: Array, start: Array, end: Array) -> tuple[Array, float] | None:
     return rotate_about_axis(axis, angle), 3.0 + 4.0 / float(np.linalg.norm(cross(axis, start)))
 
 
-def _cones(a: Array, b: Array, start: Array, end: Array) -> list[tuple[Array, Array, float]] | None:
+def _solve_cones(a: Array, b: Array, start: Array, end: Array) -> list[tuple[Array, Array, float]] | None:
     """All (R(a, α), R(b, β)) with R(a, α) R(b, β) start = end, with their gains, the one that turns nothing first; None
     where α or β is free. Raises :class:`LocusDerivationFailure` where two solutions nearly coincide.
 
@@ -243,19 +249,19 @@ def _cones(a: Array, b: Array, start: Array, end: Array) -> list[tuple[Array, Ar
     if square < -RELATION_ANGLE_TOL:
         return []
     s = math.sqrt(max(square, 0.0))
-    found = []
+    solutions = []
     ends = [p * a + q * b + sign * s * cross(a, b) for sign in (1.0, -1.0)]
     if any(lines.is_parallel(z, axis) for z in ends for axis in (a, b)):
         return None
     if EXACT_INCIDENCE_TOL < s <= RELATION_ANGLE_TOL:
         raise LocusDerivationFailure("two of its solutions nearly coincide")
     for z in sorted(ends[: 1 + (s > EXACT_INCIDENCE_TOL)], key=lambda z: float(np.linalg.norm(z - start))):
-        second, first = _about(b, start, z), _about(a, z, end)
+        second, first = _turn_about(b, start, z), _turn_about(a, z, end)
         if first is not None and second is not None:
             slopes = np.column_stack([cross(a, end), cross(first[0] @ b, end)])
             still = first[1] == second[1] == 1.0
-            found.append((first[0], second[0], 1.0 if still else 4.0 + 9.0 / float(np.linalg.norm(slopes, -2))))
-    return found
+            solutions.append((first[0], second[0], 1.0 if still else 4.0 + 9.0 / float(np.linalg.norm(slopes, -2))))
+    return solutions
 
 
 def _is_same_orientation(one: Array, other: Array) -> bool:

@@ -16,33 +16,33 @@ from ...geometry import lines
 from ...geometry.loci import Circle, Line, Plane, Point, Quadrics, Reach, Revolution, Sphere, SweptCircle
 from ...geometry.vectors import Array
 from ...tolerances import CHAIN_ROUNDING, MOVED_AXIS_LEVER_MAX, POINT_DISTANCE_TOL, RANK_GAP_MIN
-from .leg_orientations import Known, groups, orientations, ways
+from .leg_orientations import Known, group_axes, list_orientations, list_ways
 from .locked_chain import Chain, ChainBody, LocusDerivationFailure
 
 
-def reaches(chain: Chain) -> tuple[list[tuple[Reach, float]], float]:
+def derive_reaches(chain: Chain) -> tuple[list[tuple[Reach, float]], float]:
     """All components of the places of the tip, each once, the goal's own first, and by what an error of the goal grows
     in each (1 in the goal's own); and how far the leg's geometry was moved (m): what nearly meets, is parallel or at
     one point is taken to be so.
 
     Raises :class:`LocusDerivationFailure`, also where two branches are nearly one: neither the same to 1e-10 nor 1e-7
     apart."""
-    found: list[tuple[Reach, float]] = []
+    reaches: list[tuple[Reach, float]] = []
     moved = 0.0
-    for known, gain in orientations(chain):
+    for known, gain in list_orientations(chain):
         reach, radii = place(chain, known)
         if isinstance(reach, Quadrics):
             raise LocusDerivationFailure("two parts that move on a surface that is neither a plane nor a sphere")
         moved = max(moved, radii)
-        gap = min((apart(reach, other, chain.length) for other, _ in found), default=np.inf)
+        gap = min((compare_reaches(reach, known_reach, chain.length) for known_reach, _ in reaches), default=np.inf)
         if gap > POINT_DISTANCE_TOL:
-            found.append((reach, gain * chain.extent / chain.length if found else 1.0))
+            reaches.append((reach, gain * chain.extent / chain.length if reaches else 1.0))
         elif gap > POINT_DISTANCE_TOL / RANK_GAP_MIN:
             raise LocusDerivationFailure(f"two of its solutions differ by only {gap:.1e} characteristic lengths")
         else:
             moved = max(moved, gap * chain.length)
     moved = moved if moved > CHAIN_ROUNDING * chain.extent else 0.0
-    return found, MOVED_AXIS_LEVER_MAX * (chain.moved + moved)
+    return reaches, MOVED_AXIS_LEVER_MAX * (chain.moved + moved)
 
 
 @dataclass(eq=False)
@@ -100,7 +100,7 @@ class _Sum:
         if len(self.circles) == 1 and not self.lines:
             axis, spoke = self.circles[0]
             return Circle(self.centre, axis, float(np.linalg.norm(spoke)), spoke)
-        first = [axis for axis, _ in self.circles] or [_normal(self.lines)]
+        first = [axis for axis, _ in self.circles] or [_find_normal(self.lines)]
         normal = first[0]
         if all(lines.is_parallel(axis, normal) for axis in first) and all(
             lines.is_perpendicular(d, normal) for d in self.lines
@@ -110,12 +110,12 @@ class _Sum:
         if len(self.circles) == 1 and all(lines.is_parallel(d, self.lines[0]) for d in self.lines):
             return SweptCircle(self.centre, normal, float(np.linalg.norm(self.circles[0][1])), self.lines[0])
         if len(self.circles) == 2 and not self.lines:
-            one, other = (float(np.linalg.norm(spoke)) for _, spoke in self.circles)
-            return SweptCircle(self.centre, normal, one, first[1], other)
+            radius, second = (float(np.linalg.norm(spoke)) for _, spoke in self.circles)
+            return SweptCircle(self.centre, normal, radius, first[1], second)
         raise LocusDerivationFailure("circles and lines that lie in no common plane")
 
 
-def _normal(directions: Sequence[Array]) -> Array:
+def _find_normal(directions: Sequence[Array]) -> Array:
     crossed = max((np.cross(directions[0], d) for d in directions[1:]), key=lambda n: float(np.linalg.norm(n)))
     return np.asarray(crossed / np.linalg.norm(crossed))
 
@@ -126,13 +126,13 @@ def place(chain: Chain, known: Known) -> tuple[Reach | Quadrics, float]:
     for k, body in enumerate(chain.bodies):
         Q = known[k]
         if Q is not None:
-            _rests(total, body, Q)
+            _add_fixed(total, body, Q)
             continue
-        alone = [(R, parts[0][0][1]) for R, way in ways(chain, known, k) if len(parts := groups(way)) == 1]
+        alone = [(R, parts[0][0][1]) for R, way in list_ways(chain, known, k) if len(parts := group_axes(way)) == 1]
         if alone:
-            _turns(total, body, *alone[0])
+            _add_turning(total, body, *alone[0])
         elif body.watched:
-            _spins(total, body)
+            _add_spinning(total, body)
         elif not body.is_rigid:
             raise LocusDerivationFailure("a link that rotates freely and carries a P or a parallelogram")
         else:
@@ -141,7 +141,7 @@ def place(chain: Chain, known: Known) -> tuple[Reach | Quadrics, float]:
     return reach, total.moved + total.tilt * chain.extent
 
 
-def _rests(total: _Sum, body: ChainBody, Q: Array) -> None:
+def _add_fixed(total: _Sum, body: ChainBody, Q: Array) -> None:
     """A body of fixed orientation."""
     total.centre = total.centre + Q @ body.shift
     total.lines += [Q @ slide for slide in body.slides]
@@ -149,10 +149,10 @@ def _rests(total: _Sum, body: ChainBody, Q: Array) -> None:
         if crank.held:
             total.centre = total.centre + Q @ crank.vector
         else:
-            _crank(total, Q, Q @ crank.axis, crank.vector, crank.watched)
+            _add_crank(total, Q, Q @ crank.axis, crank.vector, crank.watched)
 
 
-def _crank(total: _Sum, Q: Array, axis: Array, vector: Array, watched: Sequence[Array]) -> None:
+def _add_crank(total: _Sum, Q: Array, axis: Array, vector: Array, watched: Sequence[Array]) -> None:
     """A crank that turns about a fixed direction, from the orientation Q of what carries it."""
     for d in watched:
         if not lines.is_parallel(axis, d):
@@ -165,7 +165,7 @@ def _crank(total: _Sum, Q: Array, axis: Array, vector: Array, watched: Sequence[
     total.turn(axis, Q @ vector)
 
 
-def _turns(total: _Sum, body: ChainBody, Q: Array, a: Array) -> None:
+def _add_turning(total: _Sum, body: ChainBody, Q: Array, a: Array) -> None:
     """A body that turns about the fixed direction Q a, counted from the orientation Q."""
     axis = Q @ a
     if (
@@ -188,10 +188,10 @@ def _turns(total: _Sum, body: ChainBody, Q: Array, a: Array) -> None:
     for crank in body.cranks:
         if crank.held or not lines.is_parallel(crank.axis, a):
             raise LocusDerivationFailure("a parallelogram that rotates about another axis than its own")
-        _crank(total, Q, axis, crank.vector, crank.watched)
+        _add_crank(total, Q, axis, crank.vector, crank.watched)
 
 
-def _spins(total: _Sum, body: ChainBody) -> None:
+def _add_spinning(total: _Sum, body: ChainBody) -> None:
     """A body with a direction held that turns about it."""
     d = body.watched[0]
     total.turn(d, body.shift)
@@ -202,7 +202,7 @@ def _spins(total: _Sum, body: ChainBody) -> None:
     total.lines += [d] * len(body.slides)
 
 
-def apart(one: Reach | Quadrics, other: Reach | Quadrics, length: float) -> float:
+def compare_reaches(one: Reach | Quadrics, other: Reach | Quadrics, length: float) -> float:
     """Return the difference of two loci (characteristic lengths, radians); infinite if they are of different kinds."""
     if type(one) is not type(other):
         return np.inf
@@ -213,11 +213,11 @@ def apart(one: Reach | Quadrics, other: Reach | Quadrics, length: float) -> floa
         if isinstance(one, SweptCircle)
         else one.centre - other.centre
     )
-    found = [float(np.linalg.norm(between)) / length]
+    differences = [float(np.linalg.norm(between)) / length]
     for name in ("direction", "normal", "axis"):
         if hasattr(one, name):
-            found.append(float(np.linalg.norm(np.cross(getattr(one, name), getattr(other, name)))))
+            differences.append(float(np.linalg.norm(np.cross(getattr(one, name), getattr(other, name)))))
     for name, unit in (("radius", length), ("other", length), ("profile", 1.0)):
         if hasattr(one, name):
-            found.append(float(np.abs(np.subtract(getattr(one, name), getattr(other, name))).max()) / unit)
-    return max(found)
+            differences.append(float(np.abs(np.subtract(getattr(one, name), getattr(other, name))).max()) / unit)
+    return max(differences)

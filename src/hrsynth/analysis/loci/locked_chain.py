@@ -87,10 +87,10 @@ class Chain:
     @property
     def moved(self) -> float:
         """Distance that axes and centres were moved so that they meet, coincide or are parallel, all together (m)."""
-        return self.off + self.extent * _parallel_angles(self.bodies)
+        return self.off + self.extent * _measure_parallel_angles(self.bodies)
 
 
-def chain(
+def build_chain(
     decomposition: LegDecomposition,
     leg: Leg,
     held: Sequence[Observation],
@@ -103,17 +103,17 @@ def chain(
     bodies, off = _Walk(decomposition, leg, held, goal).bodies(tip)
     if not isinstance(end, str):
         bodies = (*bodies, ChainBody(end, tip))
-    for one, other in pairwise(bodies):
-        if one.axis is not None and other.axis is not None:
-            sine = float(np.linalg.norm(cross(one.axis, other.axis)))
+    for body, after in pairwise(bodies):
+        if body.axis is not None and after.axis is not None:
+            sine = float(np.linalg.norm(cross(body.axis, after.axis)))
             if DIRECTION_SINE_TOL / RANK_GAP_MIN < sine < DIRECTION_SINE_TOL:
                 raise LocusDerivationFailure(f"two of its axes are only {sine:.1e} from parallel")
     return Chain(bodies, end != "free" if isinstance(end, str) else True, goal.model.length, off)
 
 
-def _parallel_angles(bodies: Sequence[ChainBody]) -> float:
+def _measure_parallel_angles(bodies: Sequence[ChainBody]) -> float:
     """The angles (rad) of all pairs of directions of a chain that count as parallel, and are not but for rounding."""
-    found = [
+    directions = [
         d
         for body in bodies
         for d in (
@@ -123,11 +123,7 @@ def _parallel_angles(bodies: Sequence[ChainBody]) -> float:
             *(d for crank in body.cranks for d in (crank.axis, *crank.watched)),
         )
     ]
-    angles = [
-        float(np.linalg.norm(cross(one, other)))
-        for one, other in combinations(found, 2)
-        if lines.is_parallel(one, other)
-    ]
+    angles = [float(np.linalg.norm(cross(a, b))) for a, b in combinations(directions, 2) if lines.is_parallel(a, b)]
     return sum(angle for angle in angles if angle > CHAIN_ROUNDING)
 
 
@@ -142,11 +138,16 @@ class _Walk:
         self.coordinates: dict[str, int] = {}
         """Return the number of coordinates of a joint that a motor fixes."""
         base = decomposition.mechanism.base
-        for each in held:
-            if isinstance(each, Encoder):
-                self.coordinates[each.joint] = self.coordinates.get(each.joint, 0) + 1
-            elif isinstance(each, Direction) and (each.seen_from or decomposition.mechanism.reference) == base:
-                self.watched.setdefault(each.link, []).append(goal.pose(each.link)[:3, :3] @ each.direction)
+        for observation in held:
+            if isinstance(observation, Encoder):
+                self.coordinates[observation.joint] = self.coordinates.get(observation.joint, 0) + 1
+            elif (
+                isinstance(observation, Direction)
+                and (observation.seen_from or decomposition.mechanism.reference) == base
+            ):
+                self.watched.setdefault(observation.link, []).append(
+                    goal.pose(observation.link)[:3, :3] @ observation.direction
+                )
             else:
                 raise LocusDerivationFailure("an observation is not a direction from the base")
 
@@ -154,22 +155,22 @@ class _Walk:
         """The bodies, shifts included, and how far their points were moved to meet (m); every measurement must be met
         on the way."""
         at = self.anatomy.mechanism.base
-        found = [ChainBody(None, np.zeros(3), watched=self._sight(at))]
+        bodies = [ChainBody(None, np.zeros(3), watched=self._sight(at))]
         path = self.anatomy.path(self.leg)
         self.beside = set(self.leg.joints).difference(*(edge.joints for edge in path))
         for edge in path:
-            there = edge.other(at)
+            end = edge.other(at)
             if len(edge.joints) == 1:
-                self._joint(found, self.anatomy.mechanism.joints[edge.joints[0]], at)
+                self._joint(bodies, self.anatomy.mechanism.joints[edge.joints[0]], at)
             elif isinstance(edge.word.items[0], Rods):
-                self._rods(found, edge, at)
+                self._rods(bodies, edge, at)
             else:
-                self._parallelogram(found, edge, at)
-            found[-1] = replace(found[-1], watched=found[-1].watched + self._sight(there))
-            at = there
+                self._parallelogram(bodies, edge, at)
+            bodies[-1] = replace(bodies[-1], watched=bodies[-1].watched + self._sight(end))
+            at = end
         for what in (*self.watched, *self.coordinates):
             raise LocusDerivationFailure(f"the observation at {what} is not on the path from the base to the leg's end")
-        return _shift_bodies(found, tip, POINT_DISTANCE_TOL * self.goal.model.length)
+        return _shift_bodies(bodies, tip, POINT_DISTANCE_TOL * self.goal.model.length)
 
     def _sight(self, link: str) -> tuple[Array, ...]:
         return tuple(self.watched.pop(link, ()))
@@ -229,15 +230,15 @@ class _Walk:
 
     def _links_fixed_to(self, link: str) -> set[str]:
         """A link with those that held joints beside the way fix to it."""
-        mechanism, found, new = self.anatomy.mechanism, {link}, [link]
+        mechanism, links, new = self.anatomy.mechanism, {link}, [link]
         while new:
             at = new.pop()
             for joint in mechanism.joints_of(at):
                 held = joint.name in self.beside and self.coordinates.get(joint.name) == joint.type.freedoms
-                if held and joint.other(at) not in found:
-                    found.add(joint.other(at))
+                if held and joint.other(at) not in links:
+                    links.add(joint.other(at))
                     new.append(joint.other(at))
-        return found
+        return links
 
     def _parallelogram(self, found: list[ChainBody], edge: WordEdge, at: str) -> None:
         """Both cranks are one: they stay parallel (a parallelogram is not crossed)."""
@@ -283,32 +284,32 @@ def _shift_bodies(bodies: Sequence[ChainBody], tip: Array, small: float) -> tupl
         point, off = (
             (body.point, 0.0)
             if body.axis is None
-            else _meeting(body, before, after, tip if k + 1 == len(bodies) and body.is_rigid else None, small)
+            else _find_meeting(body, before, after, tip if k + 1 == len(bodies) and body.is_rigid else None, small)
         )
         points.append(point)
         moved += off if off > CHAIN_ROUNDING * (small / POINT_DISTANCE_TOL) else 0.0
-    found = []
+    shifted = []
     for body, start, end in zip(bodies, points, [*points[1:], tip], strict=True):
         cranks = sum((crank.vector for crank in body.cranks), np.zeros(3))
-        found.append(replace(body, point=start, shift=end - start - cranks))
-    return tuple(found), moved
+        shifted.append(replace(body, point=start, shift=end - start - cranks))
+    return tuple(shifted), moved
 
 
-def _meeting(
+def _find_meeting(
     body: ChainBody, before: ChainBody | None, after: ChainBody | None, tip: Array | None, small: float
 ) -> tuple[Array, float]:
     """The point of a body's axis at which a ball, the tip or a neighbour's axis is, else its own; and how far from the
     axis that is (m)."""
     assert body.axis is not None
-    balls = [each.point for each in (before, after) if each is not None and each.axis is None]
+    balls = [neighbour.point for neighbour in (before, after) if neighbour is not None and neighbour.axis is None]
     for point in [*balls, *([] if tip is None else [tip])]:
         off = lines.measure_line_distance(point, body.point, body.axis)
         if off <= small:
             return lines.project_to_line(point, body.point, body.axis), off
-    for other in (before, after):
-        if other is not None and other.axis is not None:
-            near, far = lines.find_common_perpendicular(body.point, body.axis, other.point, other.axis)
+    for neighbour in (before, after):
+        if neighbour is not None and neighbour.axis is not None:
+            near, far = lines.find_common_perpendicular(body.point, body.axis, neighbour.point, neighbour.axis)
             off = float(np.linalg.norm(near - far))
-            if not lines.is_parallel(body.axis, other.axis) and off <= small:
+            if not lines.is_parallel(body.axis, neighbour.axis) and off <= small:
                 return near, off
     return body.point, 0.0

@@ -27,7 +27,7 @@ from ...solving.platform.pose_conditions import AtAngle, OnMovingPlane, OnPlane,
 from ...tolerances import CHAIN_ROUNDING, EXACT_INCIDENCE_TOL, MOVED_AXIS_LEVER_MAX
 from ..measured import MeasuredRobot
 from .leg_conditions import OriginAndUnit
-from .tips import KeptAngle, Tip, TipLoci, tip_loci
+from .tips import KeptAngle, Tip, TipLoci, derive_tip_loci
 
 MEASURED_VALUE_TOL = 1e-3
 """Difference of measured values (unit vectors; characteristic lengths) up to which a mode has the desired value."""
@@ -46,43 +46,45 @@ class PlatformObservation:
     def error(self, exact: float, goal: ClosedConfiguration) -> float:
         """Return how far a point of its curves within the robot's extent can be from the exact one (m), if a point of
         the robot is known to ``exact``."""
-        points = [each.place for each in self.loci if not each.turns] + [
-            each.through for each in self.loci if not each.turns
+        points = [locus.place for locus in self.loci if not locus.turns] + [
+            locus.through for locus in self.loci if not locus.turns
         ]
         if not points:
             return exact
         body = goal.pose(self.body)[:3, 3]
         far = max(float(np.linalg.norm(point - body)) for point in points) / goal.model.length
-        spread = max(float(np.linalg.norm(each.place - each.through)) for each in self.loci if not each.turns)
+        spread = max(float(np.linalg.norm(locus.place - locus.through)) for locus in self.loci if not locus.turns)
         bent = 1.0 + (goal.model.length * (1.0 + far) / spread if spread > EXACT_INCIDENCE_TOL else 0.0)
         rounding = CHAIN_ROUNDING * max(float(np.linalg.norm(point)) for point in points)
         return MOVED_AXIS_LEVER_MAX * (exact * max(1.0, far / ROTATION_LEVER_MIN) + rounding) * bent
 
 
-def sights(
+def separate_sights(
     decomposition: LegDecomposition, observation_model: ObservationModel, goal: ClosedConfiguration
 ) -> tuple[ObservationModel, tuple[PlatformObservation, ...]]:
     """Return the observations of legs, by their labels, and the others. Raises ``UnsupportedLocus`` if the locus of an
     observation is not known, or if it is neither of a leg nor between base and platform."""
     base, bodies = decomposition.mechanism.base, list_leg_ends(decomposition)
-    found, rest = list[PlatformObservation](), list[Observation]()
-    for each in observation_model.observations:
-        reference = each.seen_from or observation_model.reference
-        ends = {reference, each.link}
+    sights, rest = list[PlatformObservation](), list[Observation]()
+    for observation in observation_model.observations:
+        reference = observation.seen_from or observation_model.reference
+        ends = {reference, observation.link}
         body = next(iter(ends - {base}), base)
-        if each.leg in (*decomposition.labels, "") and (each.is_segment_direction or isinstance(each, Encoder)):
-            rest.append(each)
-        elif isinstance(each, CameraObservation | SeenAxis) and base in ends and body in bodies:
-            loci = each.loci(each.sighting(goal.pose(reference), goal.pose(each.link)))
+        if observation.leg in (*decomposition.labels, "") and (
+            observation.is_segment_direction or isinstance(observation, Encoder)
+        ):
+            rest.append(observation)
+        elif isinstance(observation, CameraObservation | SeenAxis) and base in ends and body in bodies:
+            loci = observation.loci(observation.sighting(goal.pose(reference), goal.pose(observation.link)))
             if not loci or decomposition.point is not None:
-                raise UnsupportedLocus(decomposition.mechanism.name, f"the locus of {each.text} is not known")
-            found.append(PlatformObservation(each, body, loci, body == reference))
+                raise UnsupportedLocus(decomposition.mechanism.name, f"the locus of {observation.text} is not known")
+            sights.append(PlatformObservation(observation, body, loci, body == reference))
         else:
-            rest.append(_of_leg(decomposition, each))
-    return replace(observation_model, observations=tuple(rest)), tuple(found)
+            rest.append(_set_leg(decomposition, observation))
+    return replace(observation_model, observations=tuple(rest)), tuple(sights)
 
 
-def _of_leg(decomposition: LegDecomposition, seen: Observation) -> Observation:
+def _set_leg(decomposition: LegDecomposition, seen: Observation) -> Observation:
     """The coordinate of a leg's joint, or the direction of a leg's link, as the leg's; that of a joint inside the
     platform as of no leg."""
     joint = decomposition.mechanism.joints.get(seen.joint) if isinstance(seen, Encoder) else None
@@ -98,12 +100,12 @@ def _of_leg(decomposition: LegDecomposition, seen: Observation) -> Observation:
     raise UnsupportedLocus(decomposition.mechanism.name, f"{seen.text} is of no leg and not between base and platform")
 
 
-def _with_sights(confined: TipLoci, seen: Sequence[PlatformObservation], goal: ClosedConfiguration) -> TipLoci:
+def _add_sights(confined: TipLoci, seen: Sequence[PlatformObservation], goal: ClosedConfiguration) -> TipLoci:
     """Return a platform with its observations. Raises ``UnsupportedLocus`` if these are not points on loci in the base:
     cameras on the platform beside legs that restrict it, angles in a plane."""
     turning = confined.motion in ("spatial", "oriented")
     sides = (
-        {each.back for each in seen if not _is_symmetric_kind(each)}
+        {sight.back for sight in seen if not _is_symmetric_kind(sight)}
         if turning or confined.motion == "planar"
         else set()
     )
@@ -113,41 +115,43 @@ def _with_sights(confined: TipLoci, seen: Sequence[PlatformObservation], goal: C
             goal.model.mechanism.name, "cameras on the platform, and legs or observations from the base"
         )
     tips, angles = list(confined.tips), list(confined.angles)
-    for each in seen:
-        X, label = goal.pose(each.body), each.seen.leg
-        turned = each.back != back  # camera and point change places: all is symmetric, or nothing rotates
-        for locus in each.loci:
+    for sight in seen:
+        X, label = goal.pose(sight.body), sight.seen.leg
+        turned = sight.back != back  # camera and point change places: all is symmetric, or nothing rotates
+        for locus in sight.loci:
             if locus.turns and confined.motion == "planar":
-                raise UnsupportedLocus(goal.model.mechanism.name, f"{each.seen.text} keeps an angle in a plane")
+                raise UnsupportedLocus(goal.model.mechanism.name, f"{sight.seen.text} keeps an angle in a plane")
             if locus.turns:
                 pairs = [(n, locus.place) if turned else (locus.place, n) for n in locus.normals if turning]
-                angles += [KeptAngle(label, each.body, X[:3, :3].T @ d, axis, 0.0) for d, axis in pairs]
+                angles += [KeptAngle(label, sight.body, X[:3, :3].T @ d, axis, 0.0) for d, axis in pairs]
                 continue
             place, through = (locus.through, locus.place) if turned else (locus.place, locus.through)
-            reach = _reach(replace(locus, place=place, through=through), confined.plane)
+            reach = _convert_locus(replace(locus, place=place, through=through), confined.plane)
             if reach is not None:
-                tips.append(Tip(label, each.body, X[:3, :3].T @ (place - X[:3, 3]), reach))
+                tips.append(Tip(label, sight.body, X[:3, :3].T @ (place - X[:3, 3]), reach))
     return replace(confined, tips=tuple(tips), angles=tuple(angles), back=back)
 
 
-def all_loci(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[TipLoci, tuple[PlatformObservation, ...]]:
+def derive_all_loci(
+    measured: MeasuredRobot, goal: ClosedConfiguration
+) -> tuple[TipLoci, tuple[PlatformObservation, ...]]:
     """Return the loci of tips of legs and observed points, all other measured values fixed; and the observations.
     Raises ``UnsupportedLocus``."""
     setup = measured.setup
-    rest, seen = sights(setup.decomposition, measured.observation_model, goal)
+    rest, seen = separate_sights(setup.decomposition, measured.observation_model, goal)
     if not seen:
-        return tip_loci(setup.decomposition, rest, measured.generic_pattern, goal), ()
+        return derive_tip_loci(setup.decomposition, rest, measured.generic_pattern, goal), ()
     if rest.observations:
         pattern = recognise(setup.decomposition, rest, setup.configurations, everywhere=False)
-        confined = tip_loci(setup.decomposition, rest, pattern, goal)
+        confined = derive_tip_loci(setup.decomposition, rest, pattern, goal)
     else:
-        confined = _unheld(measured, goal)
+        confined = _build_unheld(measured, goal)
     if confined.motion == "translations" and setup.dof < 3:
         raise UnsupportedLocus(setup.robot.name, "its legs restrict how the platform moves")
-    return _with_sights(confined, seen, goal), seen
+    return _add_sights(confined, seen, goal), seen
 
 
-def _unheld(measured: MeasuredRobot, goal: ClosedConfiguration) -> TipLoci:
+def _build_unheld(measured: MeasuredRobot, goal: ClosedConfiguration) -> TipLoci:
     """Return a platform without a leg. Raises ``UnsupportedLocus`` if legs restrict its motion."""
     decomposition, dof = measured.setup.decomposition, measured.setup.dof
     bodies, (motion, normal) = list_leg_ends(decomposition), measured.moving
@@ -158,10 +162,10 @@ def _unheld(measured: MeasuredRobot, goal: ClosedConfiguration) -> TipLoci:
 
 def _is_symmetric_kind(sight: PlatformObservation) -> bool:
     """Return True if it is the same condition on the camera relative to the point: a distance, a position, angles."""
-    return all(each.turns or len(each.normals) in (0, 3) for each in sight.loci)
+    return all(locus.turns or len(locus.normals) in (0, 3) for locus in sight.loci)
 
 
-def _reach(locus: FixedValueLocus, plane: Array | None) -> Reach | None:
+def _convert_locus(locus: FixedValueLocus, plane: Array | None) -> Reach | None:
     """Return the locus of a point that moves in space, or in the plane through it with a normal; None: anywhere
     there."""
     if plane is None:
@@ -180,15 +184,17 @@ def _reach(locus: FixedValueLocus, plane: Array | None) -> Reach | None:
     return None if not rank else Line(locus.place, np.cross(plane, rows[0])) if rank == 1 else Point(locus.place)
 
 
-def conditions(seen: Sequence[PlatformObservation], middle: OriginAndUnit, turned: bool) -> list[PoseCondition]:
+def list_plane_conditions(
+    seen: Sequence[PlatformObservation], middle: OriginAndUnit, turned: bool
+) -> list[PoseCondition]:
     """Return the conditions on the platform's pose, relative to the goal, of a camera on it that observes moving
     planes; or, ``turned``, on the base's relative to the platform."""
-    found, none, up = list[PoseCondition](), np.zeros(3), np.array([0.0, 0.0, 1.0])
-    for each in seen:
-        label, back = each.seen.leg, each.back != turned
-        for locus in each.loci:
+    conditions, none, up = list[PoseCondition](), np.zeros(3), np.array([0.0, 0.0, 1.0])
+    for sight in seen:
+        label, back = sight.seen.leg, sight.back != turned
+        for locus in sight.loci:
             if locus.turns:
-                found += [
+                conditions += [
                     AtAngle(label, none, n if back else locus.place, locus.place if back else n, float(n @ locus.place))
                     for n in locus.normals
                 ]
@@ -196,34 +202,40 @@ def conditions(seen: Sequence[PlatformObservation], middle: OriginAndUnit, turne
             place, through = middle.point(locus.place), middle.point(locus.through)
             body, rest = (through, place) if back else (place, through)
             if locus.radius is not None:
-                found.append(
+                conditions.append(
                     OnRevolution(label, body, none, rest, up, np.array([(locus.radius / middle.size) ** 2, 0.0, -1.0]))
                 )
             elif back and len(locus.normals) < 3:
-                found += [OnMovingPlane(label, body, n, rest, float(n @ (rest - body))) for n in locus.normals]
+                conditions += [OnMovingPlane(label, body, n, rest, float(n @ (rest - body))) for n in locus.normals]
             else:
-                found += [OnPlane(label, body, none, n, float(n @ rest)) for n in locus.normals]
-    return found
+                conditions += [OnPlane(label, body, none, n, float(n @ rest)) for n in locus.normals]
+    return conditions
 
 
 Poses = Callable[[str], Array]
 
 
-def opposite(seen: Sequence[Observation], goal: ClosedConfiguration, reference: str, pose: Poses) -> tuple[str, ...]:
+def list_opposite(
+    seen: Sequence[Observation], goal: ClosedConfiguration, reference: str, pose: Poses
+) -> tuple[str, ...]:
     """Return the observations whose value at a pose of the links is the opposite of the goal's."""
-    return tuple(each.leg for each in seen if not _has_goal_value(each, each.seen_from or reference, goal, pose))
+    return tuple(
+        observation.leg
+        for observation in seen
+        if not _has_goal_value(observation, observation.seen_from or reference, goal, pose)
+    )
 
 
 def _has_goal_value(seen: Observation, reference: str, goal: ClosedConfiguration, pose: Poses) -> bool:
     try:
-        there = seen.value(pose(reference), pose(seen.link))
+        value = seen.value(pose(reference), pose(seen.link))
     except UndefinedValue:
         return False
-    off = seen.difference(there, seen.value(goal.pose(reference), goal.pose(seen.link)))
+    off = seen.difference(value, seen.value(goal.pose(reference), goal.pose(seen.link)))
     return bool(np.all(np.abs(off / goal.model.length ** np.asarray(seen.dimension)) <= MEASURED_VALUE_TOL))
 
 
-def behind(observed: Sequence[Observation], pose: Poses) -> tuple[str, ...] | None:
+def list_behind(observed: Sequence[Observation], pose: Poses) -> tuple[str, ...] | None:
     """Return the observed points and circles that are not in front of their cameras, by their names: z ≤ 0 in the
     camera's frame; None if no named camera observes a point."""
     points = [o for o in observed if isinstance(o, CameraObservation) and o.camera is not None and o.images_point]

@@ -40,9 +40,9 @@ from ...tolerances import (
     POINT_DISTANCE_TOL,
     RELATION_ANGLE_TOL,
 )
-from .leg_orientations import kept_angle, orientations
-from .loci_from_joints import reaches
-from .locked_chain import Chain, LocusDerivationFailure, chain
+from .leg_orientations import find_kept_angle, list_orientations
+from .loci_from_joints import derive_reaches
+from .locked_chain import Chain, LocusDerivationFailure, build_chain
 
 MOVES = (-0.4, -0.15, 0.15, 0.4)
 """Distance that a leg is moved along a dof to check its tip's locus (characteristic lengths, radians)."""
@@ -108,7 +108,7 @@ class TipLoci(Value):
     """True if the base is observed from the platform: tips are points of the base as if that moved."""
 
 
-def tip_loci(
+def derive_tip_loci(
     decomposition: LegDecomposition,
     observation_model: ObservationModel,
     pattern: ConstraintPattern,
@@ -126,7 +126,7 @@ def tip_loci(
         _has_one_orientation(decomposition, observation_model, leg, goal) for leg in pattern.legs
     ):
         raise UnsupportedLocus(name, "its legs may fix the platform in another rotation")
-    plane = None if pattern.plane is None else _value(pattern.plane, goal)
+    plane = None if pattern.plane is None else _evaluate(pattern.plane, goal)
     end = (
         plane
         if plane is not None and pattern.motion == "planar"
@@ -134,17 +134,19 @@ def tip_loci(
         if pattern.motion in ("spatial", "oriented") or decomposition.point is not None
         else "kept"
     )
-    tips = tuple(_tip(decomposition, observation_model, leg, goal, end) for leg in pattern.legs if not leg.is_tip_free)
+    tips = tuple(
+        _derive_tip(decomposition, observation_model, leg, goal, end) for leg in pattern.legs if not leg.is_tip_free
+    )
     angles = tuple(
-        _angle(decomposition, observation_model, leg, goal)
+        _find_angle(decomposition, observation_model, leg, goal)
         for leg in pattern.legs
         if pattern.motion == "oriented" and leg.turns < 3
     )
-    slide, doubt = (None, None) if pattern.slide is None else _slide(decomposition, pattern, goal)
+    slide, doubt = (None, None) if pattern.slide is None else _find_slide(decomposition, pattern, goal)
     return TipLoci(goal, pattern.motion, tips, pattern.bodies, plane, slide, angles, doubt=doubt)
 
 
-def _held_chain(
+def _build_held_chain(
     decomposition: LegDecomposition,
     observation_model: ObservationModel,
     leg: LockedLeg,
@@ -152,8 +154,10 @@ def _held_chain(
     end: Array | str,
 ) -> Chain:
     """The chain to a leg's tip, its observations held; raises ``LocusDerivationFailure``."""
-    own = [o for o in observation_model.observations if o.leg == leg.label]
-    return chain(decomposition, decomposition.leg(leg.label), own, at, _value(leg.tip, at) * at.model.length, end)
+    observed = [o for o in observation_model.observations if o.leg == leg.label]
+    return build_chain(
+        decomposition, decomposition.leg(leg.label), observed, at, _evaluate(leg.tip, at) * at.model.length, end
+    )
 
 
 def _has_one_orientation(
@@ -164,49 +168,52 @@ def _has_one_orientation(
     if leg.virtual or leg.turns:
         return False
     try:
-        known = [bodies for bodies, _ in orientations(_held_chain(decomposition, observation_model, leg, goal, "free"))]
+        known = [
+            bodies
+            for bodies, _ in list_orientations(_build_held_chain(decomposition, observation_model, leg, goal, "free"))
+        ]
     except LocusDerivationFailure:
         return False
     return len(known) == 1 and known[0][-1] is not None
 
 
-def _angle(
+def _find_angle(
     decomposition: LegDecomposition, observation_model: ObservationModel, leg: LockedLeg, goal: ClosedConfiguration
 ) -> KeptAngle:
     """The angle that a leg keeps; raises ``UnsupportedLocus`` where its joints do not show one."""
     try:
-        found = _held_chain(decomposition, observation_model, leg, goal, "free")
-        axis, direction = kept_angle(found)
+        chain = _build_held_chain(decomposition, observation_model, leg, goal, "free")
+        axis, direction = find_kept_angle(chain)
     except LocusDerivationFailure as error:
         raise UnsupportedLocus(
             decomposition.mechanism.name, f"how leg {leg.label} rotates the platform is not known: {error}"
         ) from None
     return KeptAngle(
-        leg.label, leg.body, goal.pose(leg.body)[:3, :3].T @ direction, axis, MOVED_AXIS_LEVER_MAX * found.moved
+        leg.label, leg.body, goal.pose(leg.body)[:3, :3].T @ direction, axis, MOVED_AXIS_LEVER_MAX * chain.moved
     )
 
 
-def _tip(
+def _derive_tip(
     decomposition: LegDecomposition,
     observation_model: ObservationModel,
     leg: LockedLeg,
     goal: ClosedConfiguration,
     end: Array | str,
 ) -> Tip:
-    B = _value(leg.tip, goal) * goal.model.length
+    B = _evaluate(leg.tip, goal) * goal.model.length
     X = goal.pose(leg.body)
     place = X[:3, :3].T @ (B - X[:3, 3])
-    own = [o for o in observation_model.observations if o.leg == leg.label]
+    observed = [o for o in observation_model.observations if o.leg == leg.label]
 
     def branches(at: ClosedConfiguration) -> tuple[list[tuple[Reach, float]], float]:
-        return reaches(_held_chain(decomposition, observation_model, leg, at, end))
+        return derive_reaches(_build_held_chain(decomposition, observation_model, leg, at, end))
 
     try:
-        found, moved = branches(goal)
+        reaches, moved = branches(goal)
     except LocusDerivationFailure as error:
         return _fit_tip(
             decomposition,
-            own,
+            observed,
             observation_model.reference,
             Tip(leg.label, leg.body, place, Point(B), doubt=str(error)),
             leg,
@@ -216,9 +223,9 @@ def _tip(
         with suppress(LocusDerivationFailure):
             moved = branches(ClosedConfiguration(goal.model, goal.model.q0, 0.0))[1]
     freedoms = 0 if leg.fixed else 1 if leg.line is not None else 2 if leg.normal is not None else 3
-    here = found[0][0]
+    here = reaches[0][0]
     if here.freedoms == freedoms and np.linalg.norm(here.miss(B)) <= HIDDEN_ROBOT_RESIDUAL_TOL * goal.model.length:
-        return Tip(leg.label, leg.body, place, here, tuple(found[1:]), moved=moved)
+        return Tip(leg.label, leg.body, place, here, tuple(reaches[1:]), moved=moved)
     doubt = (
         f"its joints taken one by one leave {here.freedoms} dof, together {freedoms}"
         if here.freedoms != freedoms
@@ -226,7 +233,7 @@ def _tip(
     )
     return _fit_tip(
         decomposition,
-        own,
+        observed,
         observation_model.reference,
         Tip(leg.label, leg.body, place, Point(B), doubt=doubt),
         leg,
@@ -243,14 +250,14 @@ def _fit_tip(
     goal: ClosedConfiguration,
 ) -> Tip:
     """A tip's curve or surface as the pattern names it, to which the leg's moves keep."""
-    B = _value(leg.tip, goal) * goal.model.length
-    paths = _held_paths(own, reference, leg, goal, tip.place)
+    B = _evaluate(leg.tip, goal) * goal.model.length
+    paths = _follow_held_paths(own, reference, leg, goal, tip.place)
     if not leg.fixed and not paths:
         raise UnsupportedLocus(
             decomposition.mechanism.name, f"leg {leg.label} cannot be moved to find the locus of its tip"
         )
     worst = np.inf
-    for curve in _candidates(decomposition, leg, B, goal):
+    for curve in _propose_reaches(decomposition, leg, B, goal):
         miss = max((float(np.linalg.norm(curve.miss(point))) for point in paths), default=0.0) / goal.model.length
         if miss <= RELATION_ANGLE_TOL:
             return replace(tip, curve=curve)
@@ -263,7 +270,7 @@ def _fit_tip(
     raise UnsupportedLocus(decomposition.mechanism.name, f"the tip of leg {leg.label} {what}")
 
 
-def _candidates(
+def _propose_reaches(
     decomposition: LegDecomposition, leg: LockedLeg, tip: Array, goal: ClosedConfiguration
 ) -> Iterator[Reach]:
     """Curves with the tangent that the pattern names: a circle about the axis with the tip on it, or with the tip
@@ -272,26 +279,26 @@ def _candidates(
     if leg.fixed:
         yield Point(tip)
     elif isinstance(leg.line, BodyVector):
-        yield Line(tip, _value(leg.line, goal))
+        yield Line(tip, _evaluate(leg.line, goal))
     elif isinstance(leg.line, Tangent):
-        turning = _circle(leg.line, tip, goal)
-        yield from (turning, _opposite(turning, tip))
-        axis, on = _value(leg.line.axis, goal), _value(leg.line.start, goal) * goal.model.length
+        turning = _build_circle(leg.line, tip, goal)
+        yield from (turning, _mirror_circle(turning, tip))
+        axis, on = _evaluate(leg.line.axis, goal), _evaluate(leg.line.start, goal) * goal.model.length
         spoke = tip - on - axis * float(axis @ (tip - on))
         if np.linalg.norm(spoke) > POINT_DISTANCE_TOL * goal.model.length:
             yield Circle(tip - spoke, axis, float(np.linalg.norm(spoke)), spoke)
     elif leg.normal is not None:
-        n = _value(leg.normal, goal)
-        for rod in _rods(decomposition, leg, n, goal):
+        n = _evaluate(leg.normal, goal)
+        for rod in _list_rods(decomposition, leg, n, goal):
             yield from (Sphere(tip - rod, float(np.linalg.norm(rod))), Sphere(tip + rod, float(np.linalg.norm(rod))))
         yield Plane(tip, n)
 
 
-def _rods(decomposition: LegDecomposition, leg: LockedLeg, along: Array, goal: ClosedConfiguration) -> list[Array]:
+def _list_rods(decomposition: LegDecomposition, leg: LockedLeg, along: Array, goal: ClosedConfiguration) -> list[Array]:
     """From joint centre to joint centre (m) of a leg, where that is parallel to a direction."""
     joints = [decomposition.mechanism.joints[name] for name in decomposition.leg(leg.label).joints]
     centres = [locate_joint(goal, joint)[0] * goal.model.length for joint in joints]
-    between = [other - one for one, other in combinations(centres, 2)]
+    between = [end - start for start, end in combinations(centres, 2)]
     small = POINT_DISTANCE_TOL * goal.model.length
     return [
         rod
@@ -301,21 +308,21 @@ def _rods(decomposition: LegDecomposition, leg: LockedLeg, along: Array, goal: C
     ]
 
 
-def _circle(tangent: Tangent, tip: Array, goal: ClosedConfiguration) -> Circle:
+def _build_circle(tangent: Tangent, tip: Array, goal: ClosedConfiguration) -> Circle:
     """The circle on which ``tip`` moves when it translates with the end of a link that turns about an axis."""
     length = goal.model.length
-    axis = _value(tangent.axis, goal)
-    on, end = _value(tangent.start, goal) * length, _value(tangent.end, goal) * length
+    axis = _evaluate(tangent.axis, goal)
+    on, end = _evaluate(tangent.start, goal) * length, _evaluate(tangent.end, goal) * length
     spoke = end - on - axis * float(axis @ (end - on))
     return Circle(tip - spoke, axis, float(np.linalg.norm(spoke)), spoke)
 
 
-def _opposite(circle: Circle, tip: Array) -> Circle:
+def _mirror_circle(circle: Circle, tip: Array) -> Circle:
     """The circle with the same tangent at ``tip`` and its centre on the other side."""
     return Circle(2 * tip - circle.centre, circle.axis, circle.radius, circle.centre - tip)
 
 
-def _slide(
+def _find_slide(
     decomposition: LegDecomposition, pattern: ConstraintPattern, goal: ClosedConfiguration
 ) -> tuple[Circle | Line, str | None]:
     """The curve of the second body's origin relative to the first's, and why it may not be all.
@@ -323,36 +330,36 @@ def _slide(
     Where a P joins the bodies, a line. Where a parallelogram joins them it is that of a crank; else of the two circles
     with the tangent that the pattern names (whichever of the bodies its link turns about) the one that nearby
     configurations keep to."""
-    at, moving = _apart(pattern, goal, goal.q)
+    at, moving = _compute_offset(pattern, goal, goal.q)
     if pattern.slide is not None and not isinstance(pattern.slide, Tangent):
-        return Line(at, _value(pattern.slide, goal)), None
-    one, other = pattern.bodies
+        return Line(at, _evaluate(pattern.slide, goal)), None
+    first, second = pattern.bodies
     graph = WordGraph(decomposition.mechanism, pattern.bodies, decomposition.platform).recognise()
-    for _, edge in graph.between(one, other):
+    for _, edge in graph.between(first, second):
         if len(edge.joints) == 4:
             joints = [decomposition.mechanism.joints[name] for name in edge.joints[:2]]
-            near, far = joints if edge.tail == one else joints[::-1]
+            near, far = joints if edge.tail == first else joints[::-1]
             (start, axes), (end, _) = locate_joint(goal, near), locate_joint(goal, far)
             spoke = (end - start - axes[0] * float(axes[0] @ (end - start))) * goal.model.length
             return Circle(at - spoke, axes[0], float(np.linalg.norm(spoke)), spoke), None
     assert isinstance(pattern.slide, Tangent)
-    first = _circle(pattern.slide, at, goal)
-    second = _opposite(first, at)
+    circle = _build_circle(pattern.slide, at, goal)
+    mirrored = _mirror_circle(circle, at)
     kernel, _ = goal.kernel()
     step = kernel @ np.linalg.svd(moving @ kernel)[2][0]
     nearby, _ = solve(goal.model, goal.model.integrate(goal.q, MOVES[-1] * step), tolerance=CLOSURE_SOLVER_TOL)
-    there, _ = _apart(pattern, goal, nearby)
-    circle = min((first, second), key=lambda circle: float(np.linalg.norm(circle.miss(there))))
-    return circle, f"no parallelogram joins {one} and {other}"
+    offset, _ = _compute_offset(pattern, goal, nearby)
+    nearest = min((circle, mirrored), key=lambda circle: float(np.linalg.norm(circle.miss(offset))))
+    return nearest, f"no parallelogram joins {first} and {second}"
 
 
-def _apart(pattern: ConstraintPattern, goal: ClosedConfiguration, q: Array) -> tuple[Array, Array]:
+def _compute_offset(pattern: ConstraintPattern, goal: ClosedConfiguration, q: Array) -> tuple[Array, Array]:
     """From the first body's origin to the second's (3,), and its velocity (3, nv)."""
     X, V = goal.model.frames(q, pattern.bodies)
     return X[1, :3, 3] - X[0, :3, 3], V[1, :3] - V[0, :3]
 
 
-def _held_paths(
+def _follow_held_paths(
     own: Sequence[Observation], reference: str, leg: LockedLeg, goal: ClosedConfiguration, place: Array
 ) -> list[Array]:
     """Return the positions of a tip when its leg alone, with fixed measured values, is moved along each of its dof, and
@@ -362,7 +369,7 @@ def _held_paths(
     held = FixedValuesTask.at(model, model.q0, reference, own)
     start = ClosedConfiguration.of(model, model.q0, RELATION_ANGLE_TOL)
     free, _ = compute_kernel_basis(np.vstack([model.jacobian(start.q), held.error_and_jacobian(model, start.q)[1]]))
-    found = []
+    positions = []
     directions = free.T
     if len(directions) > 1:
         mixed = np.random.default_rng(0).normal(size=(MIXED_LEG_MOTIONS_COUNT, len(directions))) @ directions
@@ -372,10 +379,10 @@ def _held_paths(
             q, residual = solve(model, model.integrate(start.q, size * direction), held, tolerance=CLOSURE_SOLVER_TOL)
             X = model.pose(q, leg.body)
             if residual <= CLOSURE_RESIDUAL_TOL:
-                found.append(transform(X, place))
-    return found
+                positions.append(transform(X, place))
+    return positions
 
 
-def _value(feature: NamedVector | BodyPoint, goal: ClosedConfiguration) -> Array:
+def _evaluate(feature: NamedVector | BodyPoint, goal: ClosedConfiguration) -> Array:
     value: Array = feature.value(collect_poses([goal], feature.links))[0]
     return value

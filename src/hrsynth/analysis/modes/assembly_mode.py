@@ -20,7 +20,7 @@ from ...mechanism.pose import Pose
 from ...records import FLAT, As, Number, Record, Recorded, Shown
 from ...solving.platform.solve import SystemMode
 from ...tolerances import CLOSURE_RESIDUAL_TOL, RELATION_ANGLE_TOL
-from ..loci.observation_loci import behind, opposite, sights
+from ..loci.observation_loci import list_behind, list_opposite, separate_sights
 from ..observed import ObservedRobot
 from ..singularity.condition_check import compute_smallest_value
 from .branches import Model
@@ -103,7 +103,7 @@ class AssemblyMode(OfConfiguration, Record):
     @property
     def left_open(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
         """Noun and names of the legs or couplings that were not closed there."""
-        return tuple(each for each in (("leg", self.unclosed_legs), ("coupling", self.open_couplings)) if each[1])
+        return tuple(pair for pair in (("leg", self.unclosed_legs), ("coupling", self.open_couplings)) if pair[1])
 
     @property
     def radius(self) -> float:
@@ -113,10 +113,10 @@ class AssemblyMode(OfConfiguration, Record):
     radius_record = Shown(Number, lambda self: self.radius, As("radius"), "null if it is not known")
     radius_m = Shown(Number, lambda self: self.shift if np.isfinite(self.radius) else None)
     radius_rad = Shown(Number, lambda self: self.turn if np.isfinite(self.radius) else None)
-    closure_failures = Shown(list[LegReachFailure], lambda self: [LegReachFailure(*each) for each in self.misses])
+    closure_failures = Shown(list[LegReachFailure], lambda self: [LegReachFailure(*failure) for failure in self.misses])
 
 
-def found_mode(
+def build_mode(
     setup: ObservedRobot,
     observation_model: ObservationModel,
     at: ClosedConfiguration,
@@ -126,23 +126,23 @@ def found_mode(
 ) -> AssemblyMode:
     """Return a closed configuration that was found as a mode of which nothing is proved."""
     beyond, X = tuple(list_joints_beyond(at.model, at.q)), at.pose(setup.motion.link)
-    found = Assembly(at, (), beyond)
+    assembly = Assembly(at, (), beyond)
     return AssemblyMode(
         setup.motion.pose(X),
         np.inf,
         np.pi,
         residual,
         goal,
-        found.reachable,
+        assembly.reachable,
         compute_smallest_value(at, observation_model),
-        found.verdict,
+        assembly.verdict,
         (),
         beyond,
         (),
         at,
         length=at.model.length,
         bodies=bodies,
-        behind=behind(observation_model.observations, at.pose),
+        behind=list_behind(observation_model.observations, at.pose),
     )
 
 
@@ -154,7 +154,7 @@ class ModeReader:
     ) -> None:
         self.question, self.motion, self.made, self.goal = observation_model, setup.motion, made, goal
         self.assembler = Assembler(setup.decomposition, goal.model.length, observation_model.reference)
-        rest, self.seen = sights(setup.decomposition, observation_model, goal)
+        rest, self.seen = separate_sights(setup.decomposition, observation_model, goal)
         self.measured = FixedValuesTask.at(goal.model, goal.q, observation_model.reference, rest.observations).measured
 
     def away(self, mode: SystemMode) -> float:
@@ -173,23 +173,27 @@ class ModeReader:
         scale = self.made.system.size / size
         base = self.goal.model.mechanism.base
         pose = {base: self.goal.pose(base), **bodies}.__getitem__
-        antipodal = opposite([each.seen for each in self.seen], self.goal, self.question.reference, pose)
-        found = Assembly(self.goal)
+        antipodal = list_opposite([sight.seen for sight in self.seen], self.goal, self.question.reference, pose)
+        assembly = Assembly(self.goal)
         if antipodal:  # not a mode: the assembly of the robot is not computed
-            found = Assembly(None, platform=self.assembler.platform(bodies))
+            assembly = Assembly(None, platform=self.assembler.platform(bodies))
         elif self.made.closing is not None:
             at = self.made.closing(mode.q)
-            found = Assembly(at, (), tuple(list_joints_beyond(at.model, at.q)), held=True)
+            assembly = Assembly(at, (), tuple(list_joints_beyond(at.model, at.q)), held=True)
         elif not at_goal or near or list_joints_beyond(self.goal.model, self.goal.q):
-            found = self.assembler.at(bodies, held, 0.0 if near else self.doubt(mode))
-        if found.configuration is not None and self.made.closing is None and (gears := self.open(found.configuration)):
-            found = Assembly(None, platform=self.assembler.platform(bodies), gears=gears)
+            assembly = self.assembler.at(bodies, held, 0.0 if near else self.doubt(mode))
+        if (
+            assembly.configuration is not None
+            and self.made.closing is None
+            and (gears := self.open(assembly.configuration))
+        ):
+            assembly = Assembly(None, platform=self.assembler.platform(bodies), gears=gears)
         X = (
-            found.platform[self.motion.link]
-            if found.platform is not None
+            assembly.platform[self.motion.link]
+            if assembly.platform is not None
             else self.goal.pose(self.motion.link)
-            if found.configuration is None
-            else found.configuration.pose(self.motion.link)
+            if assembly.configuration is None
+            else assembly.configuration.pose(self.motion.link)
         )
         shift, turn = self.radius(mode, bodies, X)
         return AssemblyMode(
@@ -198,13 +202,13 @@ class ModeReader:
             turn,
             mode.residual * scale,
             at_goal,
-            found.reachable,
-            self.distance(found.configuration),
-            found.verdict,
-            found.open,
-            found.beyond,
-            found.misses,
-            found.configuration,
+            assembly.reachable,
+            self.distance(assembly.configuration),
+            assembly.verdict,
+            assembly.open,
+            assembly.beyond,
+            assembly.misses,
+            assembly.configuration,
             mode.multiplicity,
             mode.proved,
             mode.rounded,
@@ -213,8 +217,8 @@ class ModeReader:
             size,
             bodies,
             antipodal,
-            behind([each.seen for each in self.seen], pose),
-            found.gears,
+            list_behind([sight.seen for sight in self.seen], pose),
+            assembly.gears,
         )
 
     def distance(self, at: ClosedConfiguration | None) -> float | None:
@@ -245,21 +249,21 @@ class ModeReader:
         """Return how far the links' exact poses can be from the system's (characteristic lengths, radians); 0 if
         nothing was proved of them: the printed poses count."""
         length = self.goal.model.length
-        found = max(mode.shift / length, mode.turn) + self.made.system.error / length
-        return found if np.isfinite(found) else 0.0
+        error = max(mode.shift / length, mode.turn) + self.made.system.error / length
+        return error if np.isfinite(error) else 0.0
 
     def radius(self, mode: SystemMode, bodies: dict[str, Array], X: Array) -> tuple[float, float]:
         """Return how far the exact pose can be from the printed pose X (4, 4) (m, rad): the system's error, that of its
         frame at the goal, and the difference of both; of the links if X is not one of theirs."""
         first, error = next(iter(bodies.values())), self.made.system.error
         shift, turn = mode.shift + error, mode.turn + error / self.goal.model.length
-        told = bodies.get(self.motion.link)
-        if told is None:
+        known = bodies.get(self.motion.link)
+        if known is None:
             return shift, turn
-        lever = float(np.linalg.norm(told[:3, 3] - first[:3, 3]))
+        lever = float(np.linalg.norm(known[:3, 3] - first[:3, 3]))
         if self.made.back:  # the base's turn, as the platform sees it, is about a point of the platform
-            lever += float(np.linalg.norm(told[:3, 3] - self.goal.pose(self.motion.link)[:3, 3]))
+            lever += float(np.linalg.norm(known[:3, 3] - self.goal.pose(self.motion.link)[:3, 3]))
         return (
-            shift + turn * lever + float(np.linalg.norm(X[:3, 3] - told[:3, 3])),
-            turn + float(np.linalg.norm(X[:3, :3] - told[:3, :3])),
+            shift + turn * lever + float(np.linalg.norm(X[:3, 3] - known[:3, 3])),
+            turn + float(np.linalg.norm(X[:3, :3] - known[:3, :3])),
         )

@@ -44,25 +44,25 @@ class Model(Value):
     """The curves of the tips, where these give the system."""
 
 
-def model(confined: TipLoci) -> Model:
+def build_model(confined: TipLoci) -> Model:
     """The system for the way in which the platform moves."""
     at = {body: confined.goal.pose(body) for body in confined.bodies}
     curves = tuple(tip.curve for tip in confined.tips)
-    model = {"translations": _translating, "bodies": _articulated_model}.get(confined.motion, _rigid)
+    model = {"translations": _build_translating, "bodies": _build_articulated}.get(confined.motion, _build_rigid)
     made = model(confined, at, curves)
     return replace(
         made, confined=confined, system=replace(made.system, error=confined.error, as_written=confined.as_written)
     )
 
 
-def _translating(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -> Model:
+def _build_translating(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -> Model:
     """q is the position of the first body's origin; tips are counted from there."""
     p = at[confined.bodies[0]][:3, 3]
-    tips = np.array([_point(at[tip.body], tip.place) - p for tip in confined.tips])
+    tips = np.array([_place_point(at[tip.body], tip.place) - p for tip in confined.tips])
     return Model(TranslatingPlatform(curves, tips), partial(_shift_bodies, at, p), p)
 
 
-def _rigid(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -> Model:
+def _build_rigid(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -> Model:
     """q is relative to the goal: the frame of the plane of motion (in space: the base's) is at the first link's origin
     there."""
     p, n = at[confined.bodies[0]][:3, 3], confined.plane if confined.motion == "planar" else None
@@ -70,36 +70,38 @@ def _rigid(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -
     if n is not None:
         X_goal = build_pose(p, np.column_stack([*build_plane_axes(n), n]))
     back = invert_pose(X_goal)
-    tips = np.array([_point(back @ at[tip.body], tip.place) for tip in confined.tips]).reshape(-1, 3)
+    tips = np.array([_place_point(back @ at[tip.body], tip.place) for tip in confined.tips]).reshape(-1, 3)
     if n is None:
         size = confined.goal.model.length
-        arrows = np.array([size * (at[each.body][:3, :3] @ each.direction) for each in confined.angles]).reshape(-1, 3)
+        arrows = np.array([size * (at[angle.body][:3, :3] @ angle.direction) for angle in confined.angles]).reshape(
+            -1, 3
+        )
         planes = tuple(
-            Plane(p + each.axis * float(each.axis @ arrow), each.axis)
-            for each, arrow in zip(confined.angles, arrows, strict=True)
+            Plane(p + angle.axis * float(angle.axis @ arrow), angle.axis)
+            for angle, arrow in zip(confined.angles, arrows, strict=True)
         )
         system: Spatial | Planar = Spatial((*curves, *planes), np.vstack([tips, arrows]), len(arrows), p)
     else:
         system = Planar(curves, tips[:, :2], X_goal)
     home = np.array([*p, 0.0, 0.0, 0.0]) if n is None else np.zeros(3)
     carry = (
-        partial(_carried_back, system, X_goal, at)
+        partial(_carry_back, system, X_goal, at)
         if confined.back
-        else partial(_carried_bodies, system, {body: back @ X for body, X in at.items()})
+        else partial(_carry_bodies, system, {body: back @ X for body, X in at.items()})
     )
     return Model(system, carry, home, confined.back)
 
 
-def _articulated_model(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -> Model:
+def _build_articulated(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -> Model:
     """q is the first body's origin and the second's place on its circle about it."""
     assert confined.slide is not None
-    one, other = confined.bodies
-    p = at[one][:3, 3]
-    tips = np.array([_point(at[tip.body], tip.place) - at[tip.body][:3, 3] for tip in confined.tips])
+    first, second = confined.bodies
+    p = at[first][:3, 3]
+    tips = np.array([_place_point(at[tip.body], tip.place) - at[tip.body][:3, 3] for tip in confined.tips])
     sides = tuple(confined.bodies.index(tip.body) for tip in confined.tips)
     return Model(
         ArticulatedPlatform(curves, tips, sides, confined.slide),
-        partial(_on_circle, at[one], at[other], one, other, confined.slide),
+        partial(_place_on_curve, at[first], at[second], first, second, confined.slide),
         np.array([*p, 0.0]),
     )
 
@@ -109,25 +111,27 @@ def _shift_bodies(at: dict[str, Array], p: Array, q: Array) -> dict[str, Array]:
     return {body: _translate(X, q - p) for body, X in at.items()}
 
 
-def _carried_bodies(system: Spatial | Planar, at: dict[str, Array], q: Array) -> dict[str, Array]:
+def _carry_bodies(system: Spatial | Planar, at: dict[str, Array], q: Array) -> dict[str, Array]:
     """Bodies in the frame that the system's coordinates place."""
     return {body: system.pose(q) @ X for body, X in at.items()}
 
 
-def _carried_back(system: Spatial | Planar, X_goal: Array, at: dict[str, Array], q: Array) -> dict[str, Array]:
+def _carry_back(system: Spatial | Planar, X_goal: Array, at: dict[str, Array], q: Array) -> dict[str, Array]:
     """Bodies from which the base is seen displaced as the system's frame is from where it is at the goal."""
     D = X_goal @ invert_pose(system.pose(q))
     return {body: D @ X for body, X in at.items()}
 
 
-def _on_circle(X_one: Array, X_other: Array, one: str, other: str, slide: Circle | Line, q: Array) -> dict[str, Array]:
+def _place_on_curve(
+    X_one: Array, X_other: Array, one: str, other: str, slide: Circle | Line, q: Array
+) -> dict[str, Array]:
     """Two bodies, the second at a place of its curve about the first."""
     first = q[:3] - X_one[:3, 3]
     second = q[:3] + slide.at(float(q[3])) - X_other[:3, 3]
     return {one: _translate(X_one, first), other: _translate(X_other, second)}
 
 
-def _point(X: Array, place: Array) -> Array:
+def _place_point(X: Array, place: Array) -> Array:
     """A body's point (3,) in the frame of its pose."""
     return transform(X, place)
 
@@ -137,7 +141,7 @@ def _translate(X: Array, by: Array) -> Array:
     return build_pose(X[:3, 3] + by, X[:3, :3])
 
 
-def choices(confined: TipLoci) -> Iterator[TipLoci]:
+def list_choices(confined: TipLoci) -> Iterator[TipLoci]:
     """The platform with each tip on one of its reaches, in all combinations, the goal's own first."""
     for chosen in product(*(((tip.curve, 1.0), *tip.others) for tip in confined.tips)):
         tips = tuple(
@@ -151,23 +155,20 @@ def solve_all(
 ) -> tuple[Model, SystemModes]:
     """The goal's own system, and the modes of all choices of branches together, each pose once; of those as many as
     ``time_limit`` (s, by their size) allows. Raises ``TooLarge`` where it allows none."""
-    first = model(next(choices(confined))).system
+    first = build_model(next(list_choices(confined))).system
     if first.seconds > time_limit:
         raise TooLarge(
-            "a system of equations",
-            f"{len(first.curves)} legs and {first.freedoms} dof",
-            first.seconds,
-            time_limit,
+            "a system of equations", f"{len(first.curves)} legs and {first.freedoms} dof", first.seconds, time_limit
         )
     most = int(min(LEG_SOLUTION_CHOICES_MAX, time_limit / first.seconds))
-    made = [model(each) for each in islice(choices(confined), most)]
+    made = [build_model(choice) for choice in islice(list_choices(confined), most)]
     size = made[0].system.size
-    found = [
-        _rescale(solve(each.system, near=near, goal=None if k else each.home), each.system.size / size)
-        for k, each in enumerate(made)
+    solved = [
+        _scale_radii(solve(model.system, near=near, goal=None if k else model.home), model.system.size / size)
+        for k, model in enumerate(made)
     ]
     total = int(np.prod([1 + len(tip.others) for tip in confined.tips]))
-    modes = together(found, {tip.leg: 1 + len(tip.others) for tip in confined.tips}, size)
+    modes = unite_modes(solved, {tip.leg: 1 + len(tip.others) for tip in confined.tips}, size)
     doubts = [f"leg {tip.leg}: {tip.doubt}" for tip in confined.tips if tip.doubt is not None]
     doubts += [] if confined.doubt is None else [confined.doubt]
     if total > len(made):
@@ -181,7 +182,7 @@ def solve_all(
     return made[0], modes
 
 
-def _rescale(modes: SystemModes, factor: float) -> SystemModes:
+def _scale_radii(modes: SystemModes, factor: float) -> SystemModes:
     """Radii and residuals in sizes of another system."""
 
     def scaled(each: Sequence[SystemMode]) -> tuple[SystemMode, ...]:
@@ -195,7 +196,7 @@ def _rescale(modes: SystemModes, factor: float) -> SystemModes:
     return replace(modes, modes=scaled(modes.modes), near=scaled(modes.near))
 
 
-def together(found: Sequence[SystemModes], branches: Mapping[str, int], size: float) -> SystemModes:
+def unite_modes(found: Sequence[SystemModes], branches: Mapping[str, int], size: float) -> SystemModes:
     """One list of the modes of several systems, the goal's own first; a pose that is in two of them counts once.
     ``branches``: how many each leg has.
 
@@ -203,12 +204,12 @@ def together(found: Sequence[SystemModes], branches: Mapping[str, int], size: fl
     """
     if len(found) == 1 or found[0].continuous_family is not None:
         return found[0]
-    modes = _once([mode for each in found for mode in each.modes], size)
-    near = _once([*modes, *(mode for each in found for mode in each.near)], size)[len(modes) :]
-    unclear = sum(_apart(one, other, size) <= one.radius + other.radius for one, other in combinations(modes, 2))
-    twice = sum(len(each.modes) for each in found) - len(modes)
+    modes = _drop_repeats([mode for listed in found for mode in listed.modes], size)
+    near = _drop_repeats([*modes, *(mode for listed in found for mode in listed.near)], size)[len(modes) :]
+    unclear = sum(_compare_modes(a, b, size) <= a.radius + b.radius for a, b in combinations(modes, 2))
+    twice = sum(len(listed.modes) for listed in found) - len(modes)
     legs = ", ".join(f"leg {leg}: {count}" for leg, count in branches.items() if count > 1)
-    counts = [f"{each} complex in {count}" for each, count in Counter(each.complex for each in found).items()]
+    counts = [f"{number} complex in {count}" for number, count in Counter(listed.complex for listed in found).items()]
     proofs = [f"{count} × ({text})" if count > 1 else text for text, count in Counter(e.proof for e in found).items()]
     proof = (
         f"{len(found)} combinations of the locked legs' solutions ({legs}), {', '.join(counts)}"
@@ -218,38 +219,38 @@ def together(found: Sequence[SystemModes], branches: Mapping[str, int], size: fl
     )
     special = found[0].singular_solutions or next(
         (
-            f"for other leg solutions: {each.singular_solutions}"
-            for each in found
-            if each.singular_solutions is not None
+            f"for other leg solutions: {listed.singular_solutions}"
+            for listed in found
+            if listed.singular_solutions is not None
         ),
         None,
     )
-    complete = not unclear and all(each.complete for each in found)
+    complete = not unclear and all(listed.complete for listed in found)
     return SystemModes(
-        sum(each.complex or 0 for each in found) - twice,
+        sum(listed.complex or 0 for listed in found) - twice,
         modes,
         complete,
         proof,
         near,
         special,
         None,
-        next((each.bound for each in found if each.bound != "resultant"), "resultant"),
-        all(each.enclosed for each in found),
+        next((listed.bound for listed in found if listed.bound != "resultant"), "resultant"),
+        all(listed.enclosed for listed in found),
         found[0].snapped,
-        tuple(part for each in found for part in each.solved),
-        any(each.open for each in found),
+        tuple(part for listed in found for part in listed.solved),
+        any(listed.open for listed in found),
     )
 
 
-def _once(modes: Sequence[SystemMode], size: float) -> tuple[SystemMode, ...]:
+def _drop_repeats(modes: Sequence[SystemMode], size: float) -> tuple[SystemMode, ...]:
     """Each pose once, the first of those that are one to rounding."""
-    found: list[SystemMode] = []
+    distinct: list[SystemMode] = []
     for mode in modes:
-        if all(_apart(mode, other, size) > POINT_DISTANCE_TOL / RANK_GAP_MIN for other in found):
-            found.append(mode)
-    return tuple(found)
+        if all(_compare_modes(mode, known, size) > POINT_DISTANCE_TOL / RANK_GAP_MIN for known in distinct):
+            distinct.append(mode)
+    return tuple(distinct)
 
 
-def _apart(one: SystemMode, other: SystemMode, size: float) -> float:
+def _compare_modes(one: SystemMode, other: SystemMode, size: float) -> float:
     """Return the difference of two poses (sizes, entries of the rotations)."""
     return compare_poses(one.pose, other.pose, size)

@@ -18,17 +18,17 @@ from ...geometry.so3 import convert_from_quaternion, convert_rotations_to_vector
 from ...geometry.vectors import Array, build_pose, freeze_array, invert_pose
 from ...kinematics.configuration import ClosedConfiguration
 from ...solving.platform.constrained_platform import System
-from ...solving.platform.overdetermined import words
+from ...solving.platform.overdetermined import describe_fits
 from ...solving.platform.pose_bound import FEW_FORMS_SECONDS, FORMS_SECONDS, LARGEST_FORMS, bound
-from ...solving.platform.pose_boxes import PoseBox, enclose_poses, is_box_excluded, told_far
+from ...solving.platform.pose_boxes import PoseBox, describe_far, enclose_poses, is_box_excluded
 from ...solving.platform.pose_conditions import OnPlane, PoseCondition
-from ...solving.platform.pose_forms import Poses, SquareForms, proposals
+from ...solving.platform.pose_forms import Poses, SquareForms, propose_poses
 from ...solving.platform.solve import SystemMode, SystemModes
 from ...tolerances import LOCUS_DISTANCE_TOL, MOVED_AXIS_LEVER_MAX, POINT_DISTANCE_TOL, RANK_GAP_MIN, RELATION_ANGLE_TOL
-from ..loci.leg_conditions import Branches, OriginAndUnit, leg_conditions, rigid_platform
-from ..loci.observation_loci import PlatformObservation, conditions, sights
+from ..loci.leg_conditions import Branches, OriginAndUnit, list_leg_conditions, require_rigid_platform
+from ..loci.observation_loci import PlatformObservation, list_plane_conditions, separate_sights
 from ..measured import MeasuredRobot
-from .branches import LEG_SOLUTION_CHOICES_MAX, MODES_TIME_LIMIT_S, Model, together
+from .branches import LEG_SOLUTION_CHOICES_MAX, MODES_TIME_LIMIT_S, Model, unite_modes
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,32 +71,32 @@ class PosedPlatform(System):
     def miss(self, box: PoseBox) -> float:
         """The largest distance from a condition (sizes) at the middle of a real box."""
         turn, p = box.pose(self.poses)
-        R, found = convert_from_quaternion(turn), [0.0]
+        R, misses = convert_from_quaternion(turn), [0.0]
         for c in self.conditions:
             point, arrow = p + R @ c.b, R @ c.c
             slope = np.hstack(c.slopes(point, arrow, np.asarray))
-            found.append(abs(float(c.value(point, arrow, np.asarray))) / max(1.0, float(np.linalg.norm(slope))))
-        return max(found)
+            misses.append(abs(float(c.value(point, arrow, np.asarray))) / max(1.0, float(np.linalg.norm(slope))))
+        return max(misses)
 
 
-def pose_platform(measured: MeasuredRobot, goal: ClosedConfiguration) -> list[PosedPlatform]:
+def build_posed_platforms(measured: MeasuredRobot, goal: ClosedConfiguration) -> list[PosedPlatform]:
     """The platform with the measurements at a configuration, one for each choice of the legs' branches, the goal's own
     first. Raises ``UnsupportedLocus`` where a leg's conditions are not known."""
     decomposition, name = measured.setup.decomposition, measured.setup.robot.name
-    _, middle = rigid_platform(measured, goal)
+    _, middle = require_rigid_platform(measured, goal)
     motion, normal = measured.moving
-    rest, seen = sights(decomposition, measured.observation_model, goal)
-    found = [
-        leg_conditions(decomposition, leg, rest, goal, middle, normal, motion == "translations")
+    rest, seen = separate_sights(decomposition, measured.observation_model, goal)
+    by_leg = [
+        list_leg_conditions(decomposition, leg, rest, goal, middle, normal, motion == "translations")
         for leg in decomposition.legs
     ]
-    moved = MOVED_AXIS_LEVER_MAX * sum(each for _, each in found)
-    held = any(branch for branches, _ in found for branch in branches)
-    ways = [(turned, conditions(seen, middle, turned)) for turned in ((False,) if held else (False, True))]
-    turned, own = min(ways, key=lambda way: sum(c.degree for c in way[1]))
-    counts = {leg.label: len(branches) for leg, (branches, _) in zip(decomposition.legs, found, strict=True)}
-    found.append(([own], 0.0))
-    legs: list[Branches] = [branches for branches, _ in found]
+    moved = MOVED_AXIS_LEVER_MAX * sum(off for _, off in by_leg)
+    held = any(branch for branches, _ in by_leg for branch in branches)
+    ways = [(turned, list_plane_conditions(seen, middle, turned)) for turned in ((False,) if held else (False, True))]
+    turned, fewest = min(ways, key=lambda way: sum(c.degree for c in way[1]))
+    counts = {leg.label: len(branches) for leg, (branches, _) in zip(decomposition.legs, by_leg, strict=True)}
+    by_leg.append(([fewest], 0.0))
+    legs: list[Branches] = [branches for branches, _ in by_leg]
     if prod(map(len, legs)) > LEG_SOLUTION_CHOICES_MAX:
         raise UnsupportedLocus(name, f"its legs have {prod(map(len, legs))} combinations of leg solutions")
     if any(
@@ -109,7 +109,7 @@ def pose_platform(measured: MeasuredRobot, goal: ClosedConfiguration) -> list[Po
     poses = (
         Poses.translating() if motion == "translations" else Poses.spatial() if normal is None else Poses.planar(normal)
     )
-    asked = (_once([c for branch in chosen for c in branch]) for chosen in product(*legs))
+    asked = (_drop_repeats([c for branch in chosen for c in branch]) for chosen in product(*legs))
     return [
         PosedPlatform(
             (),
@@ -126,7 +126,7 @@ def pose_platform(measured: MeasuredRobot, goal: ClosedConfiguration) -> list[Po
     ]
 
 
-def _once(conditions: Sequence[PoseCondition]) -> tuple[tuple[PoseCondition, ...], float]:
+def _drop_repeats(conditions: Sequence[PoseCondition]) -> tuple[tuple[PoseCondition, ...], float]:
     """Conditions without those that several legs have in common, as where all turn about one point; and how far the
     numbers of such are apart (sizes)."""
     kept, off = list[PoseCondition](), 0.0
@@ -146,9 +146,9 @@ def _once(conditions: Sequence[PoseCondition]) -> tuple[tuple[PoseCondition, ...
     return tuple(kept), off
 
 
-def most_posed(measured: MeasuredRobot, goal: ClosedConfiguration) -> int:
+def bound_posed(measured: MeasuredRobot, goal: ClosedConfiguration) -> int:
     """Return a root bound of the modes, complex ones too. Raises ``UnsupportedLocus``."""
-    return sum(_forms(measured, each).most for each in pose_platform(measured, goal))
+    return sum(_build_forms(measured, platform).most for platform in build_posed_platforms(measured, goal))
 
 
 def solve_posed(
@@ -158,8 +158,8 @@ def solve_posed(
     and ``ExternalSolverFailure`` where not all poses are enclosed that there may be, or the choices need more than
     ``time_limit`` (s)."""
     systems = [
-        replace(each, error=each.error + max([error, *(sight.error(error, goal) for sight in each.seen)]))
-        for each in pose_platform(measured, goal)
+        replace(platform, error=platform.error + max([error, *(sight.error(error, goal) for sight in platform.seen)]))
+        for platform in build_posed_platforms(measured, goal)
     ]
     if not np.isfinite(error):
         raise UnsupportedLocus(
@@ -174,7 +174,7 @@ def solve_posed(
         first.home,
         first.back,
     )
-    forms, found = _forms(measured, first), list[SystemModes]()
+    forms, solved = _build_forms(measured, first), list[SystemModes]()
     needed = len(systems) * (FEW_FORMS_SECONDS + FORMS_SECONDS * (forms.size / LARGEST_FORMS) ** 3)
     if needed > max(time_limit, FEW_FORMS_SECONDS * (len(systems) == 1)):
         raise ExternalSolverFailure(
@@ -184,13 +184,13 @@ def solve_posed(
             "Observe other legs, or raise --time-limit.",
         )
     for system in systems:
-        found.append(_judge(system, _forms(measured, system), system is first))
-        if not found[-1].complete:
-            raise ExternalSolverFailure("the conditions on the pose", found[-1].proof)
-    return made, together(found, first.branches, first.size)
+        solved.append(_judge(system, _build_forms(measured, system), system is first))
+        if not solved[-1].complete:
+            raise ExternalSolverFailure("the conditions on the pose", solved[-1].proof)
+    return made, unite_modes(solved, first.branches, first.size)
 
 
-def _forms(measured: MeasuredRobot, system: PosedPlatform) -> SquareForms:
+def _build_forms(measured: MeasuredRobot, system: PosedPlatform) -> SquareForms:
     """Return as many of its conditions as dof. Raises ``UnsupportedLocus``, ``ExternalSolverFailure``."""
     forms = SquareForms.of(system.conditions, system.poses)
     if forms is None:
@@ -217,14 +217,14 @@ def _judge(system: PosedPlatform, forms: SquareForms, own: bool) -> SystemModes:
         else "conditions that are all linear"
     )
     most, why, named = forms.most, product_, "class"
-    proposed = proposals(forms, forms.degree, forms.most, 0)
+    proposed = propose_poses(forms, forms.degree, forms.most, 0)
     boxes, lost = ([], 1) if proposed is None else enclose_poses(forms, slack, proposed, most)
     if len(boxes) < most:
-        found = bound(forms)
-        if found is not None:
-            most, why, named = found[0], f"ranks modulo a prime of 62 bits, in degree {found[1]}", "rank"
+        bounded = bound(forms)
+        if bounded is not None:
+            most, why, named = bounded[0], f"ranks modulo a prime of 62 bits, in degree {bounded[1]}", "rank"
             if lost or len(boxes) < most:
-                proposed, lost = proposals(forms, found[1], most, found[2]), 1
+                proposed, lost = propose_poses(forms, bounded[1], most, bounded[2]), 1
         if lost:
             boxes = [] if proposed is None else enclose_poses(forms, slack, proposed)[0]
     at_goal = [box for box in boxes if own and box.real and box.has_pose(np.eye(len(box.middle))[0])]
@@ -233,18 +233,18 @@ def _judge(system: PosedPlatform, forms: SquareForms, own: bool) -> SystemModes:
     real = [box for box in boxes if box.real]
     proof = (
         f"at most {most} pose{'s' * (most != 1)} by {why}, {len(boxes)} enclosed, all distinct, "
-        f"complex ones too{told_far(boxes)}, {len(real)} real"
+        f"complex ones too{describe_far(boxes)}, {len(real)} real"
     )
     left = [c for c in system.conditions if c not in forms.planes and c not in forms.others]
     kept = [box for box in real if box is goal or not is_box_excluded(left, forms.poses, box, slack)]
     fitting = [box for box in kept if not left or box is goal or system.miss(box) <= LOCUS_DISTANCE_TOL]
-    modes = tuple(_mode(system, box, not left or box is goal) for box in fitting)
+    modes = tuple(_make_mode(system, box, not left or box is goal) for box in fitting)
     open_ = len(kept) - len(fitting)
     if left:
         others = [mode.residual for mode in modes if not mode.proved]
         proof = (
             f"from {len(system.conditions) - len(left)} of {len(system.conditions)} conditions: {proof}; of these "
-            + words(goal is not None, False, others, len(real) - len(kept), open_)
+            + describe_fits(goal is not None, False, others, len(real) - len(kept), open_)
         )
     return SystemModes(
         len(modes) if left else len(boxes),
@@ -256,7 +256,7 @@ def _judge(system: PosedPlatform, forms: SquareForms, own: bool) -> SystemModes:
     )
 
 
-def _mode(system: PosedPlatform, box: PoseBox, proved: bool) -> SystemMode:
+def _make_mode(system: PosedPlatform, box: PoseBox, proved: bool) -> SystemMode:
     """A real box as a mode."""
     shift = system.size * float(np.linalg.norm(box.radii[box.turned :]))
     # two unit quaternions at the distance δ are rotated against each other by at most 4 asin(δ / 2) ≤ π δ

@@ -37,7 +37,7 @@ from ...tolerances import (
     RELATION_ANGLE_TOL,
 )
 from ..formation import Formation, Similarities, analyze_formation, list_sensed_points
-from ..loci.observation_loci import opposite
+from ..loci.observation_loci import list_opposite
 from ..observed import ObservedRobot
 
 Bodies = dict[str, Array]
@@ -68,7 +68,7 @@ class FormedModes:
     continuum: int | None = None
 
 
-def formation_modes(setup: ObservedRobot) -> FormedModes:
+def list_formation_modes(setup: ObservedRobot) -> FormedModes:
     """The modes of a formation with the measurements of its zero configuration."""
     at, observation_model = setup.all_samples.start, setup.samples.observation_model
     formation = analyze_formation(at, observation_model, compute_relation(at, observation_model), setup.decomposition)
@@ -102,7 +102,7 @@ def _has_only_sliders(at: ClosedConfiguration) -> bool:
     return (
         at.model.nv == len(mechanism.joints)
         and not mechanism.couplings
-        and all(each.type is JointType.PRISMATIC and each.in_tree for each in mechanism.joints.values())
+        and all(joint.type is JointType.PRISMATIC and joint.in_tree for joint in mechanism.joints.values())
     )
 
 
@@ -113,27 +113,27 @@ class _SliderFormation:
     def __init__(self, setup: ObservedRobot) -> None:
         self.at, self.question = setup.all_samples.start, setup.samples.observation_model
         model = self.at.model
-        steps = [ClosedConfiguration.of(model, model.integrate(self.at.q, each)) for each in np.eye(model.nv)]
+        steps = [ClosedConfiguration.of(model, model.integrate(self.at.q, unit)) for unit in np.eye(model.nv)]
         seen, points = list_sensed_points(self.at, self.question)
         known = drift(self.at, None, setup.normal.moved) + CHAIN_ROUNDING * float(np.abs(points).max(initial=0.0))
         planes, nearest = list[Array](), np.inf
         self.spheres: list[tuple[Array, Array]] = []
         self.known = len(seen) == len(self.question.observations)
         """True if the locus of each value is known."""
-        for each, place in seen:
-            assert isinstance(each, CameraObservation | SeenAxis)
-            ends = [(each.link, 1.0), (each.seen_from or self.question.reference, -1.0)]
+        for observation, place in seen:
+            assert isinstance(observation, CameraObservation | SeenAxis)
+            ends = [(observation.link, 1.0), (observation.seen_from or self.question.reference, -1.0)]
             slopes = np.array(
                 [sum(sign * (step.pose(link) - self.at.pose(link))[:3, 3] for link, sign in ends) for step in steps]
             ).T
-            loci = each.loci(place)
+            loci = observation.loci(place)
             self.known &= bool(loci)
             for locus in loci:
                 if locus.radius is not None:
                     self.spheres.append((locus.place - locus.through, slopes))
                 elif not locus.turns:
                     planes += list(locus.normals @ slopes / model.length)
-                    along = isinstance(each, CameraObservation) and each.axis is not None
+                    along = isinstance(observation, CameraObservation) and observation.axis is not None
                     nearest = min(nearest, float(np.linalg.norm((place.foot if along else place.B) - place.C)))
         self.rows = np.array(planes).reshape(-1, model.nv)
         self.slack = NUMBER_ROUNDING + MOVED_AXIS_LEVER_MAX * known / nearest
@@ -193,8 +193,8 @@ class _SliderFormation:
         if spread > LOCUS_DISTANCE_TOL or abs(cuts[0]) <= NAMED_TWIST_TOL:
             return None
         at = ClosedConfiguration.of(self.at.model, self.at.model.integrate(self.at.q, cuts[0] * line))
-        bodies, _ = _nearest(at, self.at, self.question, group, tuple(goal.bodies))
-        reversed_ = opposite(self.question.observations, self.at, self.question.reference, at.pose)
+        bodies, _ = _move_nearest(at, self.at, self.question, group, tuple(goal.bodies))
+        reversed_ = list_opposite(self.question.observations, self.at, self.question.reference, at.pose)
         return [FormedMode(at, bodies, at.residual, reversed_)]
 
 
@@ -216,7 +216,7 @@ def _has_rank(rows: Array, slack: float, rank: int) -> bool:
     return True
 
 
-def _nearest(
+def _move_nearest(
     at: ClosedConfiguration,
     goal: ClosedConfiguration,
     observation_model: ObservationModel,
@@ -227,15 +227,15 @@ def _nearest(
     and how far points (characteristic lengths of the goal) and bodies that turn are from there."""
     points, wanted = list_sensed_points(at, observation_model)[1], list_sensed_points(goal, observation_model)[1]
     s, R, t = group.nearest(points, wanted) if len(points) else (1.0, np.eye(3), np.zeros(3))
-    found, off = Bodies(), float(np.abs(s * points @ R.T + t - wanted).max(initial=0.0)) / goal.model.length
+    moved, off = Bodies(), float(np.abs(s * points @ R.T + t - wanted).max(initial=0.0)) / goal.model.length
     for body in bodies:
         X, turns = (
             at.pose(body),
             bool(np.abs(at.model.frames(at.q, (body,))[1][0][3:]).max(initial=0.0) > NAMED_TWIST_TOL),
         )
-        found[body] = build_pose(s * R @ X[:3, 3] + t, R @ X[:3, :3] if turns else X[:3, :3])
-        off = max(off, float(np.abs(found[body][:3, :3] - goal.pose(body)[:3, :3]).max()))
-    return found, off
+        moved[body] = build_pose(s * R @ X[:3, 3] + t, R @ X[:3, :3] if turns else X[:3, :3])
+        off = max(off, float(np.abs(moved[body][:3, :3] - goal.pose(body)[:3, :3]).max()))
+    return moved, off
 
 
 def _search(
@@ -267,22 +267,22 @@ def _search(
         if residual > CLOSURE_RESIDUAL_TOL:
             continue
         closed, quiet = closed + 1, quiet + 1
-        there = ClosedConfiguration.of(model, model.remove_turns(q))
-        if compute_relation(there, observation_model).rank < rank:
+        restored = ClosedConfiguration.of(model, model.remove_turns(q))
+        if compute_relation(restored, observation_model).rank < rank:
             loose += 1
             continue
         known = next(
             (
                 k
                 for k, mode in enumerate(modes)
-                if _nearest(there, mode.configuration, observation_model, group, formation.bodies)[1]
+                if _move_nearest(restored, mode.configuration, observation_model, group, formation.bodies)[1]
                 <= RELATION_ANGLE_TOL
             ),
             None,
         )
         if known is None:
-            bodies, _ = _nearest(there, at, observation_model, group, formation.bodies)
-            modes.append(FormedMode(there, bodies, residual))
+            bodies, _ = _move_nearest(restored, at, observation_model, group, formation.bodies)
+            modes.append(FormedMode(restored, bodies, residual))
             met.append(1)
             quiet = 0
         else:

@@ -86,13 +86,13 @@ def search(goal: ClosedConfiguration, observation_model: ObservationModel, bodie
     is free, self-motions are followed."""
     model, rng = goal.model, np.random.default_rng(0)
     held = FixedValuesTask.at(model, goal.q, observation_model.reference, observation_model.observations)
-    own = (
+    goal_motion = (
         self_motion(goal, observation_model, bodies, goal=True)
         if has_unobserved_motion(goal, observation_model)
         else None
     )
-    found = [FoundMode(goal, _poses(goal, bodies), goal.residual, 1)] if own is None else []
-    motions = [] if own is None else [own]
+    listed = [FoundMode(goal, _collect_poses(goal, bodies), goal.residual, 1)] if goal_motion is None else []
+    motions = [] if goal_motion is None else [goal_motion]
     starts = closed = loose = quiet = 0
     near = list[FoundMode]()
     while starts < MODE_SEARCH_STARTS_MAX and quiet < MODE_SEARCH_QUIET_STARTS_COUNT:
@@ -110,25 +110,25 @@ def search(goal: ClosedConfiguration, observation_model: ObservationModel, bodie
             continue
         closed, quiet = closed + 1, quiet + 1
         at = ClosedConfiguration.of(model, model.remove_turns(q))
-        poses = _poses(at, bodies)
+        poses = _collect_poses(at, bodies)
         known = next(
             (
                 k
-                for k, mode in enumerate(found)
+                for k, mode in enumerate(listed)
                 if bodies_apart(mode.bodies, poses, observation_model, model.length) <= RELATION_ANGLE_TOL
             ),
             None,
         )
         if known is not None:
-            mode = found[known]
+            mode = listed[known]
             better = (
                 mode.configuration is not goal
                 and list_joints_beyond(model, mode.configuration.q)
                 and not list_joints_beyond(model, q)
             )
-            found[known] = FoundMode(at if better else mode.configuration, mode.bodies, mode.residual, mode.met + 1)
+            listed[known] = FoundMode(at if better else mode.configuration, mode.bodies, mode.residual, mode.met + 1)
         elif not has_unobserved_motion(at, observation_model):
-            found.append(FoundMode(at, poses, residual, 1))
+            listed.append(FoundMode(at, poses, residual, 1))
             quiet = 0
         elif (
             on := next((k for k, motion in enumerate(motions) if motion.has_visited(at, observation_model)), None)
@@ -146,7 +146,7 @@ def search(goal: ClosedConfiguration, observation_model: ObservationModel, bodie
             else:
                 motions.append(replace(motion, hits=1))
                 quiet = 0
-    return ModeSearch(tuple(found), tuple(motions), starts, closed, loose, tuple(near))
+    return ModeSearch(tuple(listed), tuple(motions), starts, closed, loose, tuple(near))
 
 
 def _add_near(
@@ -162,17 +162,19 @@ def _add_near(
     if left > CLOSURE_RESIDUAL_TOL:
         return
     at = ClosedConfiguration.of(model, model.remove_turns(q))
-    poses = _poses(at, bodies)
-    if all(bodies_apart(each.bodies, poses, observation_model, model.length) > NEAR_MODE_DISTANCE_MAX for each in near):
+    poses = _collect_poses(at, bodies)
+    if all(
+        bodies_apart(known.bodies, poses, observation_model, model.length) > NEAR_MODE_DISTANCE_MAX for known in near
+    ):
         near.append(FoundMode(at, poses, residual, 1))
 
 
 def has_unobserved_motion(at: ClosedConfiguration, observation_model: ObservationModel) -> bool:
     """Return True if the measured values leave the platform a dof, to first order or nearly: then rounding makes closed
     configurations about one that is not."""
-    there = compute_relation(at, observation_model)
-    return there.rank < there.dof.value or there.seen.weakest < NONZERO_SINGULAR_VALUE_MIN
+    relation = compute_relation(at, observation_model)
+    return relation.rank < relation.dof.value or relation.seen.weakest < NONZERO_SINGULAR_VALUE_MIN
 
 
-def _poses(at: ClosedConfiguration, bodies: Sequence[str]) -> dict[str, Array]:
+def _collect_poses(at: ClosedConfiguration, bodies: Sequence[str]) -> dict[str, Array]:
     return {body: at.pose(body) for body in bodies}

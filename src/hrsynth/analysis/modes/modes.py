@@ -26,7 +26,7 @@ from ...options import option
 from ...progress import report
 from ...records import FLAT, OPTIONAL, As, Shown, recorded
 from ...results import Result
-from ...solving.platform.solve import SystemModes, continuum
+from ...solving.platform.solve import SystemModes, make_family
 from ...tolerances import MEASUREMENT_BOUND, NEAR_POSE_DIFFERENCE_TOL
 from ..analysis_declaration import analysis
 from ..branch.joint_line import follow_line
@@ -36,14 +36,14 @@ from ..measured import MeasuredRobot
 from ..observation_inputs import POINTS, CameraLike, LegsLike, Seed, SensorLike
 from ..observed import ObservedRobot, RobotLike
 from ..setup_records import LIMITS_IGNORED
-from .assembly_mode import AssemblyMode, ModeReader, found_mode
+from .assembly_mode import AssemblyMode, ModeReader, build_mode
 from .branches import MODES_TIME_LIMIT_S, Model
 from .condition_modes import PosedPlatform, solve_posed
-from .formation_modes import formation_modes
+from .formation_modes import list_formation_modes
 from .mode_search import FoundMode, has_unobserved_motion, search
 from .natural_modes import NaturalPlatform, prove_existence, solve_natural
-from .near_modes import NearMode, measurement_bound, near_modes, poses_alike
-from .tip_modes import may_count_more, solve_tips, without_couplings
+from .near_modes import NearMode, describe_poses_alike, find_near_modes, parse_measurement_bound
+from .tip_modes import drop_couplings, may_count_more, solve_tips
 
 WITHIN = {
     "formation": "configurations up to trivial motions",
@@ -181,7 +181,7 @@ class AssemblyModes(Result, shown_as="modes"):
     @property
     def alike(self) -> str:
         """Number of poses that a measurement with an error does not distinguish, as text."""
-        return poses_alike(self.modes, self.near_modes)
+        return describe_poses_alike(self.modes, self.near_modes)
 
     @property
     def count(self) -> str:
@@ -194,8 +194,8 @@ class AssemblyModes(Result, shown_as="modes"):
                 f"{count} self-motion{'s' * (count > 1)}, and {len(self.modes)} real that "
                 f"{'lies' if len(self.modes) == 1 else 'lie'} on none"
             )
-        other = f" and {len(self.antipodal)} antipodal" if self.antipodal else ""
-        return f"{len(self.modes)} real{other}" + (
+        antipodal = f" and {len(self.antipodal)} antipodal" if self.antipodal else ""
+        return f"{len(self.modes)} real{antipodal}" + (
             "" if self.found.complex is None else f" of {self.found.complex} complex"
         )
 
@@ -215,13 +215,14 @@ class AssemblyModes(Result, shown_as="modes"):
     continuous_family = Shown(int | None, lambda self: self.found.continuous_family)
     motions_record = Shown(
         list[FollowedMotion],
-        lambda self: [FollowedMotion(self.pose_of(each), each) for each in self.self_motions],
+        lambda self: [FollowedMotion(self.pose_of(motion), motion) for motion in self.self_motions],
         As("self_motions"),
     )
     snapped = Shown(
         list[MeantLegs],
         lambda self: [
-            MeantLegs(each.where, [self.labels[k] for k in each.legs], each.defect) for each in self.found.snapped
+            MeantLegs(snapped.where, [self.labels[k] for k in snapped.legs], snapped.defect)
+            for snapped in self.found.snapped
         ],
     )
     limits_ignored = LIMITS_IGNORED
@@ -265,8 +266,7 @@ def modes(
     ] = None,
     real: Annotated[bool, option("Fix the real robot's own motors instead.")] = False,
     cone: Annotated[
-        float | str,
-        option("Measurement bound: poses that differ by no more are near modes; 0 for none.", "ANGLE"),
+        float | str, option("Measurement bound: poses that differ by no more are near modes; 0 for none.", "ANGLE")
     ] = MEASUREMENT_BOUND,
     as_written: bool = False,
     time_limit: Annotated[
@@ -334,13 +334,13 @@ def modes(
     if real and (observe not in (None, "all", ["all"]) or sensor is not None):
         given = "--observe" if sensor is None else "--sensor"
         raise BadRequest(f"--real: cannot be combined with {given}", remedy="Omit one.")
-    bound = measurement_bound(cone)
+    bound = parse_measurement_bound(cone)
     setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed, driven=real)
     if setup.robot.formation:
-        return _modes_of_formation(setup, at, real)
+        return _list_formation(setup, at, real)
     asked = None if at is None or isinstance(at, ClosedConfiguration) else parse_pose(at)
     if isinstance(asked, ModeNumber):
-        at, asked = at_mode(modes(setup), asked), None
+        at, asked = assemble_at_mode(modes(setup), asked), None
     elif isinstance(asked, JointPose):
         at, asked = follow_line(setup.all_samples.start, setup.motion, asked), None
     setup = setup if asked is None else setup.printing_like([asked])
@@ -351,9 +351,9 @@ def modes(
         goal = track_to_pose(goal, setup.all_samples.observation_model, asked, motion)
     measured = MeasuredRobot.of(setup, real)
     tried = list[TriedWay]()
-    found = _list_modes(setup, measured, goal, wanted, real, as_written, time_limit, tried)
-    near = near_modes(setup, goal, measured.observation_model, found.modes, found.candidates, bound)
-    return replace(found, candidates=(), near_modes=near, measurement_bound=bound, tried=tuple(tried))
+    listed = _list_modes(setup, measured, goal, wanted, real, as_written, time_limit, tried)
+    near = find_near_modes(setup, goal, measured.observation_model, listed.modes, listed.candidates, bound)
+    return replace(listed, candidates=(), near_modes=near, measurement_bound=bound, tried=tuple(tried))
 
 
 def _list_modes(
@@ -373,26 +373,26 @@ def _list_modes(
     free = setup.dof - measured.rank
     if free:
         text = f"the {'motors' if real else 'measured values'} leave {free} of the platform's dof undetermined"
-        own = self_motion(goal, measured.observation_model, list_placing_links(setup.decomposition), goal=True)
+        goal_motion = self_motion(goal, measured.observation_model, list_placing_links(setup.decomposition), goal=True)
         return AssemblyModes(
             setup,
             kind,
             goal,
             pose,
-            continuum(f"{text}: a continuous family of dimension {free}", free),
+            make_family(f"{text}: a continuous family of dimension {free}", free),
             (),
-            self_motions=() if own is None else (own,),
+            self_motions=() if goal_motion is None else (goal_motion,),
         )
     report("modes")
 
     def search_all(reason: str) -> AssemblyModes:
         tried.append(TriedWay("random starts of the whole robot", reason))
-        return _modes_by_search(setup, measured.observation_model, goal, pose, kind, reason)
+        return _list_by_search(setup, measured.observation_model, goal, pose, kind, reason)
 
     try:
         if not as_written and _is_on_self_motion(setup, measured.observation_model, goal):
             return search_all("the pose lies on a self-motion")
-        listed = _modes_by_system(setup, measured, goal, wanted, pose, kind, as_written, time_limit, tried)
+        listed = _list_by_system(setup, measured, goal, wanted, pose, kind, as_written, time_limit, tried)
     except (UnsupportedLocus, ExternalSolverFailure, TooLarge, MissingExtra) as error:
         return search_all(error.reason)
     moving = (
@@ -405,7 +405,7 @@ def _list_modes(
     )
     if not moving and not listed.found.open:
         return listed
-    found = search_all(
+    searched = search_all(
         "some of the solutions lie on a self-motion"
         if moving
         else "the equations depend on each other"
@@ -413,13 +413,13 @@ def _list_modes(
         else str(listed.found.singular_solutions)
     )
     return (
-        found
+        searched
         if moving or not any(mode.proved for mode in listed.modes)
-        else replace(listed, self_motions=found.self_motions)
+        else replace(listed, self_motions=searched.self_motions)
     )
 
 
-def _modes_of_formation(setup: ObservedRobot, where: object, real: bool) -> AssemblyModes:
+def _list_formation(setup: ObservedRobot, where: object, real: bool) -> AssemblyModes:
     """List the modes of a formation; poses and motors are refused, which are those of one platform."""
     if where is not None or real:
         raise BadRequest(
@@ -427,27 +427,27 @@ def _modes_of_formation(setup: ObservedRobot, where: object, real: bool) -> Asse
             remedy="Omit the option: the values at the file's configuration are fixed.",
         )
     report("modes")
-    found, goal = formation_modes(setup), setup.all_samples.start
+    formed, goal = list_formation_modes(setup), setup.all_samples.start
     system = SystemModes(
-        found.complex,
+        formed.complex,
         (),
-        found.complete,
-        found.proof,
-        singular_solutions=found.degenerate,
-        continuous_family=found.continuum,
-        bound=found.bound,
+        formed.complete,
+        formed.proof,
+        singular_solutions=formed.degenerate,
+        continuous_family=formed.continuum,
+        bound=formed.bound,
     )
     first = setup.samples.observation_model.platform
     listed = list[AssemblyMode]()
-    for each in found.modes:
-        at = each.configuration
+    for formed_mode in formed.modes:
+        at = formed_mode.configuration
         whole = Assembly(at, (), tuple(list_joints_beyond(at.model, at.q)))
         listed.append(
             AssemblyMode(
-                Pose.of(each.bodies[first]),
+                Pose.of(formed_mode.bodies[first]),
                 np.inf,
                 np.pi,
-                each.residual,
+                formed_mode.residual,
                 at is goal,
                 whole.reachable,
                 None,
@@ -456,10 +456,10 @@ def _modes_of_formation(setup: ObservedRobot, where: object, real: bool) -> Asse
                 whole.beyond,
                 (),
                 at,
-                proved=found.complete,
+                proved=formed.complete,
                 length=goal.model.length,
-                bodies=each.bodies,
-                opposite=each.opposite,
+                bodies=formed_mode.bodies,
+                opposite=formed_mode.opposite,
             )
         )
     return AssemblyModes(
@@ -469,12 +469,12 @@ def _modes_of_formation(setup: ObservedRobot, where: object, real: bool) -> Asse
         Pose.of(goal.pose(first)),
         system,
         tuple(mode for mode in listed if not mode.opposite),
-        formation=found.formation,
+        formation=formed.formation,
         antipodal=tuple(mode for mode in listed if mode.opposite),
     )
 
 
-def at_mode(listed: AssemblyModes | None, asked: ModeNumber) -> ClosedConfiguration:
+def assemble_at_mode(listed: AssemblyModes | None, asked: ModeNumber) -> ClosedConfiguration:
     """Return the robot assembled at one of its modes, its coordinates relative to the zero configuration; raises
     ``BadRequest``, ``PoseReachFailure``."""
     assert listed is not None
@@ -510,7 +510,7 @@ def _is_on_self_motion(setup: ObservedRobot, observation_model: ObservationModel
     )
 
 
-def _modes_by_search(
+def _list_by_search(
     setup: ObservedRobot,
     observation_model: ObservationModel,
     goal: ClosedConfiguration,
@@ -521,7 +521,7 @@ def _modes_by_search(
     """List the modes that a search finds, with the reason why no list can be complete."""
     done = search(goal, observation_model, list_placing_links(setup.decomposition))
     size = max((motion.dimension for motion in done.self_motions), default=None)
-    found = SystemModes(
+    system_modes = SystemModes(
         None,
         (),
         False,
@@ -534,7 +534,7 @@ def _modes_by_search(
         kind,
         goal,
         pose,
-        found,
+        system_modes,
         tuple(_read_found(setup, observation_model, mode, mode.configuration is goal) for mode in done.modes),
         tuple(_read_found(setup, observation_model, mode) for mode in done.near),
         self_motions=done.self_motions,
@@ -544,10 +544,10 @@ def _modes_by_search(
 def _read_found(
     setup: ObservedRobot, observation_model: ObservationModel, mode: FoundMode, goal: bool = False
 ) -> AssemblyMode:
-    return found_mode(setup, observation_model, mode.configuration, mode.bodies, mode.residual, goal)
+    return build_mode(setup, observation_model, mode.configuration, mode.bodies, mode.residual, goal)
 
 
-def _modes_by_system(
+def _list_by_system(
     setup: ObservedRobot,
     measured: MeasuredRobot,
     goal: ClosedConfiguration,
@@ -563,7 +563,7 @@ def _modes_by_system(
     reasons = list[UnsupportedLocus | ExternalSolverFailure | TooLarge | MissingExtra]()
     answers = list[tuple[Model, SystemModes]]()
     exact = drift(goal, wanted, setup.normal.moved)
-    free = without_couplings(measured, goal)
+    free = drop_couplings(measured, goal)
     ways: dict[str, Callable[..., tuple[Model, SystemModes]]] = {
         "natural coordinates": partial(solve_natural, time_limit=time_limit),
         "loci of tips": partial(solve_tips, as_written=as_written, time_limit=time_limit),
@@ -589,24 +589,25 @@ def _modes_by_system(
     if not answers:
         raise reasons[0]
     # all dof are observed: a continuous family is that of legs which tips alone do not show
-    made, found = max(
-        answers, key=lambda each: (each[1].complete, each[1].continuous_family is None, not may_count_more(each[0]))
+    made, solved = max(
+        answers,
+        key=lambda answer: (answer[1].complete, answer[1].continuous_family is None, not may_count_more(answer[0])),
     )
     if free is not None and made.closing is None:
-        found = replace(found, proof=f"without couplings, which only exclude poses: {found.proof}")
+        solved = replace(solved, proof=f"without couplings, which only exclude poses: {solved.proof}")
     reader = ModeReader(setup, measured.observation_model if free is None else free[0].observation_model, goal, made)
-    at_goal = min(found.modes, key=reader.away, default=None)
-    ordered = sorted(found.modes, key=lambda mode: mode is not at_goal)
+    at_goal = min(solved.modes, key=reader.away, default=None)
+    ordered = sorted(solved.modes, key=lambda mode: mode is not at_goal)
     read = [reader.read(mode, mode is at_goal) for mode in ordered]
-    if isinstance(made.system, NaturalPlatform) and found.enclosed:
+    if isinstance(made.system, NaturalPlatform) and solved.enclosed:
         read = [prove_existence(mode, goal, measured.observation_model, setup.normal.moved) for mode in read]
-    near = [reader.read(mode, False) for mode in found.near if reader.away(mode) > NEAR_POSE_DIFFERENCE_TOL]
+    near = [reader.read(mode, False) for mode in solved.near if reader.away(mode) > NEAR_POSE_DIFFERENCE_TOL]
     return AssemblyModes(
         setup,
         kind,
         goal,
         pose,
-        found,
+        solved,
         tuple(mode for mode in read if not mode.opposite),
         tuple(mode for mode in near if not mode.opposite),
         model=made,

@@ -33,7 +33,7 @@ from ...tolerances import (
 )
 from ..accuracy.measurement_bounds import require_single_angle
 from ..observed import ObservedRobot
-from .assembly_mode import AssemblyMode, found_mode
+from .assembly_mode import AssemblyMode, build_mode
 
 CONTINUOUS_FAMILY_STEP_MAX = 0.02
 """Step (characteristic lengths, radians) over which values of a near mode must stay within the bound in a family."""
@@ -66,7 +66,7 @@ class NearMode(AssemblyMode):
             if self.distance > NEAR_POSE_DIFFERENCE_TOL * self.length
             else (f"rotated by {np.degrees(self.turned):.3g}°")
         )
-        return f"by {degrees(self.angle)}, {far}"
+        return f"by {format_degrees(self.angle)}, {far}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -89,7 +89,7 @@ def descend(
     if the loops open. Where the values leave a dof, a family is a motion either way with differences up to ``bound``
     (rad)."""
     at, model = start, start.model
-    error, motions, rates = _changes(at, held)
+    error, motions, rates = _find_changes(at, held)
     for _ in range(NEAR_MODE_STEPS_MAX):
         step = motions @ np.linalg.lstsq(rates, -error, rcond=None)[0]
         q, _ = solve(model, model.integrate(at.q, shorten_step(step, 0.5)), tolerance=CLOSURE_SOLVER_TOL)
@@ -97,14 +97,16 @@ def descend(
             at = ClosedConfiguration.of(model, q)
         except LoopClosureFailure:
             return None
-        error, motions, rates = _changes(at, held)
+        error, motions, rates = _find_changes(at, held)
         if float(np.abs(step).max(initial=0.0)) < GEOMETRY_DIFFERENCE_TOL:
             break
     else:
         return None
-    angle, there = _largest(error, held), compute_relation(at, observation_model)
-    if there.rank == there.dof.value and there.seen.weakest >= NONZERO_SINGULAR_VALUE_MIN:
-        return StationaryPose(at, angle, bool(_loop_rates(at, held, motions, rates).min(initial=1.0) > 0.0), False)
+    angle, relation = _find_largest(error, held), compute_relation(at, observation_model)
+    if relation.rank == relation.dof.value and relation.seen.weakest >= NONZERO_SINGULAR_VALUE_MIN:
+        return StationaryPose(
+            at, angle, bool(_compute_loop_rates(at, held, motions, rates).min(initial=1.0) > 0.0), False
+        )
     moving = compute_platform_motions(at, observation_model)
     way = moving @ np.linalg.svd(held.error_and_jacobian(model, at.q)[1] @ moving)[2][-1]
     beside = (
@@ -112,17 +114,17 @@ def descend(
         for step in (CONTINUOUS_FAMILY_STEP_MAX, -CONTINUOUS_FAMILY_STEP_MAX)
     )
     return StationaryPose(
-        at, angle, False, all(_largest(held.error_and_jacobian(model, q)[0], held) <= bound for q in beside)
+        at, angle, False, all(_find_largest(held.error_and_jacobian(model, q)[0], held) <= bound for q in beside)
     )
 
 
-def _largest(error: Array, held: FixedValuesTask) -> float:
+def _find_largest(error: Array, held: FixedValuesTask) -> float:
     """Return the largest angle (rad) of the differences of fixed values, one below the other (rows,)."""
     parts = np.split(error, np.cumsum([o.size for o, _ in held.measured])[:-1])
     return 2 * float(np.arcsin(min(1.0, max((float(np.linalg.norm(part)) for part in parts), default=0.0) / 2)))
 
 
-def _changes(at: ClosedConfiguration, held: FixedValuesTask) -> tuple[Array, Array, Array]:
+def _find_changes(at: ClosedConfiguration, held: FixedValuesTask) -> tuple[Array, Array, Array]:
     """Return the errors of the fixed values (rows,), the motions of the loops (nv, k) that change them, and their rates
     (rows, k)."""
     error, rates = held.error_and_jacobian(at.model, at.q)
@@ -132,7 +134,7 @@ def _changes(at: ClosedConfiguration, held: FixedValuesTask) -> tuple[Array, Arr
     return error, motions, rates @ motions
 
 
-def _loop_rates(at: ClosedConfiguration, held: FixedValuesTask, motions: Array, rates: Array) -> Array:
+def _compute_loop_rates(at: ClosedConfiguration, held: FixedValuesTask, motions: Array, rates: Array) -> Array:
     """The eigenvalues of (JᵀJ)⁻¹ H, H the Hessian of ½ ‖e‖² along motions, J the rates of e: by differences of the
     slope, of which the part beside JᵀJ is of the size of e."""
     model = at.model
@@ -149,7 +151,7 @@ def _loop_rates(at: ClosedConfiguration, held: FixedValuesTask, motions: Array, 
     return np.asarray(np.sort(np.linalg.eigvals(np.linalg.solve(rates.T @ rates, (bends + bends.T) / 2)).real))
 
 
-def near_modes(
+def find_near_modes(
     setup: ObservedRobot,
     goal: ClosedConfiguration,
     observation_model: ObservationModel,
@@ -159,26 +161,29 @@ def near_modes(
 ) -> tuple[NearMode, ...]:
     """The near modes with differences up to ``bound`` (rad) to which candidates lead, those of least difference first:
     isolated minima, none of them the goal or a ``known`` mode, and one of those that are connected."""
-    held, found = (
+    held, near_modes = (
         FixedValuesTask.at(goal.model, goal.q, observation_model.reference, observation_model.observations),
         list[NearMode](),
     )
     for mode in candidates if bound else ():
-        near = _near(setup, goal, observation_model, held, mode, bound)
+        near = _make_near_mode(setup, goal, observation_model, held, mode, bound)
         if near is None or near.angle > bound:
             continue
         bodies = near.bodies or {}
-        others = [{body: goal.pose(body) for body in bodies}, *(each.bodies or {} for each in (*known, *found))]
+        others = [
+            {body: goal.pose(body) for body in bodies},
+            *(known_mode.bodies or {} for known_mode in (*known, *near_modes)),
+        ]
         if all(
-            bodies_apart(bodies, other, observation_model, goal.model.length) > NEAR_POSE_DIFFERENCE_TOL
-            for other in others
+            bodies_apart(bodies, poses, observation_model, goal.model.length) > NEAR_POSE_DIFFERENCE_TOL
+            for poses in others
         ):
-            found.append(near)
-    families = [each for each in found if each.family]
-    return tuple(sorted((each for each in found if each not in families[1:]), key=lambda each: each.angle))
+            near_modes.append(near)
+    families = [mode for mode in near_modes if mode.family]
+    return tuple(sorted((mode for mode in near_modes if mode not in families[1:]), key=lambda mode: mode.angle))
 
 
-def _near(
+def _make_near_mode(
     setup: ObservedRobot,
     goal: ClosedConfiguration,
     observation_model: ObservationModel,
@@ -197,12 +202,12 @@ def _near(
         if least is None or not (least.isolated or least.family):
             return None
         at, angle, stable, family = least.configuration, least.angle, least.isolated or None, least.family
-        mode = found_mode(
+        mode = build_mode(
             setup, observation_model, at, {body: at.pose(body) for body in mode.bodies or {}}, mode.residual
         )
-    distance, turned = distance_from(setup.motion, goal, mode)
+    distance, turned = measure_distance(setup.motion, goal, mode)
     return NearMode(
-        **{each.name: getattr(mode, each.name) for each in fields(AssemblyMode)},
+        **{field.name: getattr(mode, field.name) for field in fields(AssemblyMode)},
         angle=angle,
         distance=distance,
         turned=turned,
@@ -211,35 +216,35 @@ def _near(
     )
 
 
-def degrees(angle: float) -> str:
+def format_degrees(angle: float) -> str:
     """Return an angle (rad) in degrees, rounded, never as zero."""
     return f"{max(float(np.degrees(angle)), 1e-9):.1g}°"
 
 
-def poses_alike(modes: Sequence[AssemblyMode], near: Sequence[NearMode]) -> str:
+def describe_poses_alike(modes: Sequence[AssemblyMode], near: Sequence[NearMode]) -> str:
     """Return the number of poses that a measurement with an error does not distinguish, and their kinds."""
     count = len(modes) + len(near)
     exact = sum(not mode.goal for mode in modes)
     others = [f"{exact} with the same values"] * bool(exact)
-    isolated = [each for each in near if not each.family]
+    isolated = [mode for mode in near if not mode.family]
     if len(isolated) == 1:
         others.append(f"one that differs {isolated[0].differs}")
     elif isolated:
-        others.append(f"{len(isolated)} that differ by up to {degrees(isolated[-1].angle)}")
-    others += [f"a continuous family that differs {each.differs} at one of its poses" for each in near if each.family]
+        others.append(f"{len(isolated)} that differ by up to {format_degrees(isolated[-1].angle)}")
+    others += [f"a continuous family that differs {mode.differs} at one of its poses" for mode in near if mode.family]
     return f"{count} poses look the same: {', '.join(['the goal', *others[:-1]])} and {others[-1]}"
 
 
-def distance_from(motion: PlatformMotion, goal: ClosedConfiguration, mode: AssemblyMode) -> tuple[float, float]:
+def measure_distance(motion: PlatformMotion, goal: ClosedConfiguration, mode: AssemblyMode) -> tuple[float, float]:
     """Return the platform's distance from its pose at the goal (m, rad)."""
-    home, there = goal.pose(motion.link), mode.pose
-    at = np.array([there.x, there.y, there.z], dtype=float)
+    home, pose = goal.pose(motion.link), mode.pose
+    at = np.array([pose.x, pose.y, pose.z], dtype=float)
     return float(np.linalg.norm(at - motion.position(home))), (
-        0.0 if there.rotation is None else compute_rotation_angle(there.rotation @ home[:3, :3].T)
+        0.0 if pose.rotation is None else compute_rotation_angle(pose.rotation @ home[:3, :3].T)
     )
 
 
-def measurement_bound(cone: float | str) -> float:
+def parse_measurement_bound(cone: float | str) -> float:
     """Return a measurement bound (rad) as a user writes it, 0 for none; raises ``BadRequest``."""
     try:
         exact = parse_plain_number(str(cone).removesuffix("deg").strip()) == 0

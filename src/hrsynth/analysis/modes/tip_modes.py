@@ -16,14 +16,14 @@ from ...mechanism.observations.encoder import Encoder
 from ...mechanism.sensors import make_encoders
 from ...solving.platform.pose_conditions import AtAngle
 from ...solving.platform.solve import SystemModes
-from ..loci.observation_loci import all_loci
+from ..loci.observation_loci import derive_all_loci
 from ..measured import MeasuredRobot
 from ..observed import ObservedRobot
 from .branches import Model, solve_all
-from .condition_modes import PosedPlatform, most_posed, solve_posed
+from .condition_modes import PosedPlatform, bound_posed, solve_posed
 
 
-def without_couplings(
+def drop_couplings(
     measured: MeasuredRobot, goal: ClosedConfiguration
 ) -> tuple[MeasuredRobot, ClosedConfiguration] | None:
     """Return the robot without its couplings, at the same configuration, with its measured values fixed: so are joints
@@ -33,8 +33,10 @@ def without_couplings(
     mechanism, setup = goal.model.mechanism, measured.setup
     if not mechanism.couplings:
         return None
-    held = {each.joint for each in measured.observation_model.observations if isinstance(each, Encoder)}
-    ties = [{each.driver, each.driven} for each in mechanism.couplings]
+    held = {
+        observation.joint for observation in measured.observation_model.observations if isinstance(observation, Encoder)
+    }
+    ties = [{coupling.driver, coupling.driven} for coupling in mechanism.couplings]
     tied = set(held)
     while more := set().union(*(tie for tie in ties if tie & tied)) - tied:
         tied |= more
@@ -46,21 +48,25 @@ def without_couplings(
     links, joints = loose.mechanism.links, loose.mechanism.joints
     if not tied <= joints.keys() or any(
         link not in links
-        for each in measured.observation_model.observations
-        for link in (each.link, each.seen_from or each.link)
+        for observation in measured.observation_model.observations
+        for link in (observation.link, observation.seen_from or observation.link)
     ):
         return None  # without couplings what they hold apart is one joint
     of = {name: leg.label for leg in loose.decomposition.legs for name in leg.joints}
     seen = (
         *measured.observation_model.observations,
         *(
-            each
+            encoder
             for name in sorted(tied - held)
-            for each in make_encoders(loose.mechanism, loose.mechanism.joints[name], of.get(name, ""))
+            for encoder in make_encoders(loose.mechanism, loose.mechanism.joints[name], of.get(name, ""))
         ),
     )
-    found = MeasuredRobot(loose, loose.all_samples.measure(seen))
-    return (found, at) if found.rank == loose.dof and loose.decomposition.labels == setup.decomposition.labels else None
+    uncoupled = MeasuredRobot(loose, loose.all_samples.measure(seen))
+    return (
+        (uncoupled, at)
+        if uncoupled.rank == loose.dof and loose.decomposition.labels == setup.decomposition.labels
+        else None
+    )
 
 
 def may_count_more(made: Model) -> bool:
@@ -74,25 +80,25 @@ def solve_tips(
     measured: MeasuredRobot, goal: ClosedConfiguration, exact: float, as_written: bool, time_limit: float
 ) -> tuple[Model, SystemModes]:
     """All modes by where the tips of the legs can be, with the goal known to ``exact`` (m)."""
-    confined, seen = all_loci(measured, goal)
+    confined, seen = derive_all_loci(measured, goal)
     # a curve that was fitted to a leg's moves is not known to hold its exact tip
     fitted = confined.doubt is not None or any(tip.doubt is not None for tip in confined.tips)
     confined = replace(
         confined,
         error=np.inf
         if fitted
-        else max([exact, *(each.error(exact, goal) for each in seen)])
+        else max([exact, *(sight.error(exact, goal) for sight in seen)])
         + max([*(tip.moved for tip in confined.tips), *(angle.moved for angle in confined.angles)]),
         as_written=as_written,
     )
     return solve_all(confined, time_limit=time_limit)
 
 
-def expected_modes(measured: MeasuredRobot, at: ClosedConfiguration) -> int:
+def bound_modes(measured: MeasuredRobot, at: ClosedConfiguration) -> int:
     """Return a root bound of the modes, complex ones too, from the degrees of the legs' conditions; the largest number
     if these are not known."""
     try:
-        return most_posed(measured, at)
+        return bound_posed(measured, at)
     except (UnsupportedLocus, ExternalSolverFailure):
         return sys.maxsize
 
@@ -100,15 +106,15 @@ def expected_modes(measured: MeasuredRobot, at: ClosedConfiguration) -> int:
 def count_modes(measured: MeasuredRobot, at: ClosedConfiguration) -> SystemModes:
     """List the modes with the measured values at a configuration, without near ones, and not read as poses of the
     robot's legs: as :func:`format_modes`, for many configurations of one robot that observes all its dof."""
-    found = None
+    counted = None
     if measured.generic_pattern.motion != "oriented":
         with suppress(UnsupportedLocus, ExternalSolverFailure, TooLarge, MissingExtra):
-            found = solve_all(all_loci(measured, at)[0], near=False)[1]
-    if found is not None and found.complete:
-        return found
+            counted = solve_all(derive_all_loci(measured, at)[0], near=False)[1]
+    if counted is not None and counted.complete:
+        return counted
     try:
         return solve_posed(measured, at)[1]
     except (UnsupportedLocus, ExternalSolverFailure):
-        if found is None:
+        if counted is None:
             raise
-        return found
+        return counted

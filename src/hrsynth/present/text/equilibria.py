@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from typing import TYPE_CHECKING
 
-from ...analysis.modes.near_modes import degrees, measurement_bound
+from ...analysis.modes.near_modes import format_degrees, parse_measurement_bound
 from ...tolerances import MEASUREMENT_BOUND
 from .poses import describe_completeness
 from .tables import GAP, Rows, format_camera_rows, format_head_rows, format_listing, format_table, name_all
@@ -195,8 +195,8 @@ def _format_line(each: Equilibrium) -> list[str]:
         notes.append(f"{name_all('leg', each.legs_in_other_mode)} in another working mode")
     if each.beyond_limits:
         notes.append(f"beyond joint limits: {', '.join(each.beyond_limits)}")
-    if each.kind == "critical" and each.stable and each.error <= measurement_bound(MEASUREMENT_BOUND):
-        notes.append(f"near mode: directions differ by at most {degrees(each.error)}")
+    if each.kind == "critical" and each.stable and each.error <= parse_measurement_bound(MEASUREMENT_BOUND):
+        notes.append(f"near mode: directions differ by at most {format_degrees(each.error)}")
     if each.convergence_rates and each.kind == "critical":
         notes.append(
             f"convergence rates {', '.join(f'{(low + high) / 2:.3g}' for low, high in each.convergence_rates)}"

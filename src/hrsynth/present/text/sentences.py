@@ -11,7 +11,7 @@ import numpy as np
 from ...analysis.accuracy.accuracy import Accuracy
 from ...analysis.modes.assembly_mode import AssemblyMode
 from ...analysis.modes.modes import AssemblyModes
-from ...analysis.modes.near_modes import degrees, distance_from
+from ...analysis.modes.near_modes import format_degrees, measure_distance
 from ...analysis.observed import ObservedRobot
 from ...analysis.verdict import CONTROLLABLE, Verdict
 from ...geometry.vectors import Array
@@ -152,12 +152,12 @@ def _describe_others(found: AssemblyModes, count: int, met: list[AssemblyMode]) 
                 else ("No other pose was found at which the legs look the same")
             )
         return f"{words}." if known else f"{words}; others are not excluded."
-    away = sorted(distance_from(found.setup.motion, found.goal, mode) for mode in met)
+    away = sorted(measure_distance(found.setup.motion, found.goal, mode) for mode in met)
     near, turn = away[0]
     far = f"{_format_length(near)} away" if near > RELATION_ANGLE_TOL else f"rotated by {np.degrees(turn):.2g}°"
     where = f"one other pose, {far}" if len(met) == 1 else f"{_format_count(len(met))} other poses, the nearest {far}"
     if found.near_modes:
-        where += f" (directions that differ by no more than {degrees(found.near_modes[-1].angle)})"
+        where += f" (directions that differ by no more than {format_degrees(found.near_modes[-1].angle)})"
     return f"The loop may stop at {where}{'' if known else ', others are not excluded'}."
 
 

@@ -20,7 +20,7 @@ from ...geometry.loci import Point, Reach, curves_of, extent, length, shift_reac
 from ...geometry.vectors import Array, build_pose, freeze_array
 from ...results import Value
 from ...tolerances import SOLUTION_DISTANCE_MAX, TIP_ROUNDING
-from .quadrics import UNIT, WORKING_FRAME_ROUNDING_TOL, Balls, PoseParametrization, Within, WorkingFrame, spatial_frame
+from .quadrics import UNIT, WORKING_FRAME_ROUNDING_TOL, Balls, PoseParametrization, Within, WorkingFrame, choose_frame
 from .square_systems import SquareSystem
 
 ELIMINATION_SECONDS, HOMOTOPY_SECONDS, MSOLVE_SECONDS = 0.02, 0.4, 2.0
@@ -98,7 +98,7 @@ class System(Value):
     @cached_property
     def frame(self) -> WorkingFrame:
         """A working frame for all tips and what they can reach."""
-        return spatial_frame(self.curves, self.size)
+        return choose_frame(self.curves, self.size)
 
     def apart(
         self, q: Array, at: Array, legs: Sequence[int], points: Sequence[tuple[Array, float]]

@@ -22,7 +22,7 @@ from ...geometry.vectors import Array, times
 from ...tolerances import ENDPOINT_DISTANCE_TOL, SOLUTION_DISTANCE_MAX
 from ..newton import approach_zeros, solve_squares
 from .polynomials import Quadric
-from .study_coordinates import forms
+from .study_coordinates import list_pose_forms
 
 SHARP_ENDPOINT_STEP_TOL = 1e-9
 """Newton step (unit vectors) at which a path endpoint is accurate."""
@@ -59,10 +59,10 @@ class PathEndpoints:
     far: Array
 
 
-def section() -> Array:
+def make_section() -> Array:
     """The start: the equation e·g = 0 and six combinations of the forms, with coefficients of length one; shape
     (7, 8, 8)."""
-    normal, quadrics = forms()
+    normal, quadrics = list_pose_forms()
     turns = np.array([pow(5, k + 1, 10007) for k in range(6 * len(quadrics))]) / 10007
     return np.concatenate([normal[None], np.tensordot(np.exp(2j * np.pi * turns).reshape(6, -1), quadrics, 1)])
 
@@ -71,10 +71,10 @@ def section() -> Array:
 def _start() -> tuple[Array, Array]:
     """Section and its solutions (40, 8), unit vectors, computed once by monodromy."""
     x = np.load(Path(__file__).with_name("section.npy")).astype(complex)
-    return section(), _sharpen(section(), x)[0]
+    return make_section(), _sharpen(make_section(), x)[0]
 
 
-def ends(
+def find_endpoints(
     quadrics: Sequence[Quadric], study: Array, resting: Sequence[int] = (), enough: int | None = None
 ) -> PathEndpoints:
     """The ends of all paths to seven quadrics in unknowns x; other paths are taken where some were lost and fewer than
@@ -85,33 +85,33 @@ def ends(
     quadrics of e are left, and eight paths.
     """
     back = np.linalg.inv(study)
-    wanted = np.array([back.T @ np.asarray(each.A, dtype=float) @ back for each in quadrics])
+    wanted = np.array([back.T @ np.asarray(quadric.A, dtype=float) @ back for quadric in quadrics])
     wanted = wanted + wanted.transpose(0, 2, 1)
     wanted = wanted / np.abs(wanted).max(axis=(1, 2))[:, None, None]
-    lift = np.vstack([np.eye(4), _turning(wanted[[0, *resting]])]) if resting else np.eye(8)
+    lift = np.vstack([np.eye(4), _solve_turning(wanted[[0, *resting]])]) if resting else np.eye(8)
     to = lift.T @ np.delete(wanted, [0, *resting] if resting else [], axis=0) @ lift
-    start, x = _corners() if resting else _start()
-    found = _UnitEndpoints()
+    start, x = _build_corners() if resting else _start()
+    ends = _UnitEndpoints()
     for number in range(HOMOTOPY_ROUNDS_MAX):
         with np.errstate(all="ignore"):
             at = _normalise(_follow_paths(start * np.exp(1j * (1.2 + 2.0 * number)), to, x) @ lift.T)
-            found = _sort_ends(wanted, at, found.sharp)
-        if not found.lost or len(found.sharp) >= (enough or len(x)):
+            ends = _sort_ends(wanted, at, ends.sharp)
+        if not ends.lost or len(ends.sharp) >= (enough or len(x)):
             break
-    at = np.array([*found.sharp, *found.singular]).reshape(-1, 8) @ back.T
-    multiple = (1,) * len(found.sharp) + found.multiple
-    far = np.reshape(found.far, (-1, 8))
-    return PathEndpoints(at[:, 1:] / at[:, :1], multiple, len(far), found.lost, found.loose, far)
+    at = np.array([*ends.sharp, *ends.singular]).reshape(-1, 8) @ back.T
+    multiple = (1,) * len(ends.sharp) + ends.multiple
+    far = np.reshape(ends.far, (-1, 8))
+    return PathEndpoints(at[:, 1:] / at[:, :1], multiple, len(far), ends.lost, ends.loose, far)
 
 
-def _corners() -> tuple[Array, Array]:
+def _build_corners() -> tuple[Array, Array]:
     """Three quadrics of e, shape (3, 4, 4), and their eight solutions (8, 4): eₖ² = cₖ² e₀²."""
-    c, one = np.exp(1j * np.arange(4)), np.eye(4)
-    start = np.array([np.diag(one[k] - c[k] ** 2 * one[0]) for k in range(1, 4)])
+    c, unit = np.exp(1j * np.arange(4)), np.eye(4)
+    start = np.array([np.diag(unit[k] - c[k] ** 2 * unit[0]) for k in range(1, 4)])
     return start, _normalise(np.array([c * signs for signs in product((1.0,), *[(1.0, -1.0)] * 3)]))
 
 
-def _turning(quadrics: Array) -> Array:
+def _solve_turning(quadrics: Array) -> Array:
     """G, shape (4, 4), with g = G e where quadrics (4, 8, 8) without squares of g vanish: on (e, G e) they are zero."""
     columns = [[form + form.T for form in quadrics[:, :4, 4:] @ unit.reshape(4, 4)] for unit in np.eye(16)]
     table = np.array(columns).reshape(16, -1).T
@@ -175,20 +175,20 @@ class _UnitEndpoints:
 def _sort_ends(wanted: Array, x: Array, known: Sequence[Array]) -> _UnitEndpoints:
     """Classify the endpoints (m, 8) of paths, with solutions that are ``known`` already."""
     left, (x, sharp) = x, _sharpen(wanted, x)
-    infinite = _distance(x) > SOLUTION_DISTANCE_MAX
+    infinite = _compute_distance(x) > SOLUTION_DISTANCE_MAX
     sharp &= ~infinite
-    poses = _conjugates([*known, *x[sharp]])
+    poses = _add_conjugates([*known, *x[sharp]])
     vague, misses, least = _sharpen_singular(wanted, left[~infinite & ~sharp])
     vague = vague[
         (misses < ENDPOINT_DISTANCE_TOL)
         & (least < SINGULAR_ENDPOINT_VALUE_TOL)
-        & (_distance(vague) < SOLUTION_DISTANCE_MAX)
+        & (_compute_distance(vague) < SOLUTION_DISTANCE_MAX)
     ]
     groups: list[list[Array]] = []
-    for each in vague:
-        group = next((group for group in groups if _apart(each, group[0]) < SINGULAR_ENDPOINT_DISTANCE_TOL), [])
+    for end in vague:
+        group = next((group for group in groups if _compare_lines(end, group[0]) < SINGULAR_ENDPOINT_DISTANCE_TOL), [])
         groups += [] if group else [group]
-        group.append(each)
+        group.append(end)
     several = [group for group in groups if len(group) > 1]
     multiple = tuple(len(group) for group in several)
     far = left[infinite]
@@ -197,13 +197,13 @@ def _sort_ends(wanted: Array, x: Array, known: Sequence[Array]) -> _UnitEndpoint
     return _UnitEndpoints(poses, singular, multiple, tuple(far), max(0, lost), len(groups) - len(several))
 
 
-def _conjugates(x: Sequence[Array]) -> list[Array]:
+def _add_conjugates(x: Sequence[Array]) -> list[Array]:
     """Distinct vectors up to factors, each with its conjugate; real ones without imaginary parts."""
-    found: list[Array] = []
-    for each in map(_turn_real, x):
-        if all(_apart(each, other) > ENDPOINT_DISTANCE_TOL for other in found):
-            found += [each] if np.isrealobj(each) else [each, each.conj()]
-    return found
+    distinct: list[Array] = []
+    for vector in map(_turn_real, x):
+        if all(_compare_lines(vector, known) > ENDPOINT_DISTANCE_TOL for known in distinct):
+            distinct += [vector] if np.isrealobj(vector) else [vector, vector.conj()]
+    return distinct
 
 
 def _turn_real(x: Array, flat: float = ENDPOINT_DISTANCE_TOL) -> Array:
@@ -213,12 +213,12 @@ def _turn_real(x: Array, flat: float = ENDPOINT_DISTANCE_TOL) -> Array:
     return x.real if np.abs(x.imag).max() < flat else x
 
 
-def _apart(one: Array, other: Array) -> float:
+def _compare_lines(u: Array, v: Array) -> float:
     """Return the difference of two unit vectors, up to factors."""
-    return float(np.linalg.norm(one - other * np.vdot(other, one)))
+    return float(np.linalg.norm(u - v * np.vdot(v, u)))
 
 
-def _distance(x: Array) -> Array:
+def _compute_distance(x: Array) -> Array:
     """Return how far the poses (n, 8) are away (sizes), at least."""
     e, g = x[:, :4], x[:, 4:]
     return 2.0 * np.linalg.norm(g, axis=1) * np.linalg.norm(e, axis=1) / (np.abs((e * e).sum(axis=1)) + 1e-300)
@@ -228,7 +228,7 @@ def _evaluate(quadrics: Array, x: Array, fixed: Array) -> tuple[Array, Array]:
     """The quadrics and ``fixed`` · x − 1 at x (m, 8), and their derivatives."""
     J = 2.0 * np.einsum("kij,nj->nki", quadrics, x)
     F = np.einsum("nki,ni->nk", J, x) / 2.0
-    return np.column_stack([F, (fixed * x).sum(axis=1) - 1.0]), _border(J, fixed)
+    return np.column_stack([F, (fixed * x).sum(axis=1) - 1.0]), _add_border(J, fixed)
 
 
 def _sharpen(quadrics: Array, x: Array) -> tuple[Array, NDArray[np.bool_]]:
@@ -253,10 +253,10 @@ def _sharpen_singular(quadrics: Array, x: Array) -> tuple[Array, Array, Array]:
 
 def _step(J: Array, x: Array, F: Array) -> Array:
     """The solution of J d = −F, normal to x."""
-    return solve_squares(_border(J, x.conj()), np.column_stack([-F, np.zeros(len(x))]))
+    return solve_squares(_add_border(J, x.conj()), np.column_stack([-F, np.zeros(len(x))]))
 
 
-def _border(J: Array, last: Array) -> Array:
+def _add_border(J: Array, last: Array) -> Array:
     """J (m, n, n + 1) with a last row (m, n + 1)."""
     return np.concatenate([J, last[:, None]], axis=1)
 

@@ -76,7 +76,7 @@ class FixedForm(NamedTuple):
         return list(self.row)
 
 
-def beyond(part: PoseSystem, balls: Within, far: Array, wanted: int) -> int:
+def count_beyond(part: PoseSystem, balls: Within, far: Array, wanted: int) -> int:
     """Count the solutions at infinity, or beyond ``SOLUTION_DISTANCE_MAX`` for all input in the balls, that are
     enclosed and distinct: near the ends ``far`` (m, 8) of paths, as (e, g). Other coordinates are tried until as many
     as ``wanted`` are."""
@@ -89,21 +89,21 @@ def beyond(part: PoseSystem, balls: Within, far: Array, wanted: int) -> int:
 
 
 def _enclose_infinity(part: PoseSystem, balls: Within, far: Array, mark: Array) -> int:
-    """As :func:`beyond_limits`, with e and g' fixed by mark·e = 1 and mark·g' = 0; ``mark`` (4,) has entries of length
+    """As :func:`count_beyond`, with e and g' fixed by mark·e = 1 and mark·g' = 0; ``mark`` (4,) has entries of length
     one."""
     from flint import acb
 
-    study, own = part.chart.study, part.chart.nonzero
+    study, norm = part.chart.study, part.chart.nonzero
     assert study is not None
-    assert own is not None
+    assert norm is not None
     rows = [np.append(mark @ half, 0.0) for half in (study[:4], study[4:])]
     quadrics = part.equations()
-    rounded = _equations([Quadric(each.A.astype(float)) for each in quadrics], own.A.astype(float), rows)
-    thick = _equations(part.equations(balls), own.A, [np.array([acb(v) for v in row], dtype=object) for row in rows])
+    rounded = _build_nine([Quadric(quadric.A.astype(float)) for quadric in quadrics], norm.A.astype(float), rows)
+    thick = _build_nine(part.equations(balls), norm.A, [np.array([acb(v) for v in row], dtype=object) for row in rows])
     boxes: list[list[Any]] = []
     known: list[Array] = []
-    for z in _polish(rounded, _starts(np.vstack([far, far.conj()]), mark, study)):
-        if not np.all(np.isfinite(z)) or any(np.abs(z - other).max() < ENDPOINT_DISTANCE_TOL for other in known):
+    for z in _polish(rounded, _place_starts(np.vstack([far, far.conj()]), mark, study)):
+        if not np.all(np.isfinite(z)) or any(np.abs(z - point).max() < ENDPOINT_DISTANCE_TOL for point in known):
             continue
         known.append(z)
         box = enclose_zero(thick, [acb(v) for v in z.tolist()])
@@ -112,18 +112,18 @@ def _enclose_infinity(part: PoseSystem, balls: Within, far: Array, mark: Array) 
         # |e|² is at least 1/|mark|² = 1/4, and |e·e| = |e·g'|² / |κ|
         x = np.array(box[:8])
         size = float((x @ quadrics[0].A @ x).abs_upper()) ** 2 / float(box[8].abs_lower())
-        if 4.0 * size * SOLUTION_DISTANCE_MAX < 1.0 and all(_is_disjoint(box, other) for other in boxes):
+        if 4.0 * size * SOLUTION_DISTANCE_MAX < 1.0 and all(_is_disjoint(box, kept) for kept in boxes):
             boxes.append(box)
     return len(boxes)
 
 
-def _equations(quadrics: Sequence[Quadric], own: Any, rows: Sequence[Any]) -> list[Polynomial]:
+def _build_nine(quadrics: Sequence[Quadric], norm: Any, rows: Sequence[Any]) -> list[Polynomial]:
     """The nine for quadrics of which the first is e·g, with the factor and the multiple fixed by rows (9,)."""
-    first, *rest = (each.A for each in quadrics)
-    return [FixedForm(rows[0], 1), FixedForm(rows[1], 0), FarPose(own, first), *map(FarCondition, rest)]
+    first, *rest = (quadric.A for quadric in quadrics)
+    return [FixedForm(rows[0], 1), FixedForm(rows[1], 0), FarPose(norm, first), *map(FarCondition, rest)]
 
 
-def _starts(far: Array, mark: Array, study: Array) -> Array:
+def _place_starts(far: Array, mark: Array, study: Array) -> Array:
     """(e, g', κ) in the chart's coordinates with mark·e = 1 and mark·g' = 0, shape (m, 9), of (e, g)."""
     x = far / (far[:, :4] @ mark)[:, None]
     e, g = x[:, :4], x[:, 4:]
@@ -136,14 +136,14 @@ def _polish(equations: Sequence[Polynomial], starts: Array) -> Array:
     """Places (m, 9) after Newton's steps."""
 
     def evaluate(z: Array) -> tuple[Array, Array]:
-        J: Array = np.array([[equation.slopes(list(each)) for equation in equations] for each in z], dtype=complex)
-        F: Array = np.array([[equation.value(list(each)) for equation in equations] for each in z], dtype=complex)
+        J: Array = np.array([[equation.slopes(list(point)) for equation in equations] for point in z], dtype=complex)
+        F: Array = np.array([[equation.value(list(point)) for equation in equations] for point in z], dtype=complex)
         scale = np.abs(J).max(axis=2)
         return F / scale, J / scale[..., None]
 
     return approach_zeros(evaluate, starts, steps=ENDPOINT_NEWTON_STEPS_COUNT).x
 
 
-def _is_disjoint(one: Sequence[Any], other: Sequence[Any]) -> bool:
+def _is_disjoint(box: Sequence[Any], second: Sequence[Any]) -> bool:
     """Return True if two boxes are disjoint."""
-    return any(not (a - b).contains(0) for a, b in zip(one, other, strict=True))
+    return any(not (a - b).contains(0) for a, b in zip(box, second, strict=True))

@@ -27,15 +27,15 @@ Form = dict[tuple[int, ...], Any]
 """Coefficients, fractions or residues, by exponents."""
 
 
-def most_zeros(quadrics: Sequence[Quadric], enough: int) -> int | None:
+def bound_zeros(quadrics: Sequence[Quadric], enough: int) -> int | None:
     """The least bound that is found, the first that is ``enough``; None where none is."""
-    forms, n = [_form(each) for each in quadrics], len(quadrics[0].A) - 1
+    forms, n = [_read_form(quadric) for quadric in quadrics], len(quadrics[0].A) - 1
     left = list(range(n))
-    while (line := _line(forms := _reduce_forms(forms))) is not None:
-        k = max((k for k in left if _at(line, k)), key=lambda k: abs(_at(line, k)), default=None)
+    while (line := _find_line(forms := _reduce_forms(forms))) is not None:
+        k = max((k for k in left if _get_slope(line, k)), key=lambda k: abs(_get_slope(line, k)), default=None)
         if k is None:
             return 0
-        forms = [_without(form, line, k) for form in forms if form is not line]
+        forms = [_eliminate(form, line, k) for form in forms if form is not line]
         left.remove(k)
     if len(forms) < len(left):
         return None
@@ -44,8 +44,8 @@ def most_zeros(quadrics: Sequence[Quadric], enough: int) -> int | None:
         for form in forms
     ]
     best: int | None = None
-    for groups in partitions(list(range(len(left)))):
-        best = min((each for each in (best, _least_bound(flat, groups, enough)) if each is not None), default=None)
+    for groups in list_partitions(list(range(len(left)))):
+        best = min((b for b in (best, _find_least_bound(flat, groups, enough)) if b is not None), default=None)
         if best is not None and best <= enough:
             break
     return best if left else 1
@@ -53,89 +53,89 @@ def most_zeros(quadrics: Sequence[Quadric], enough: int) -> int | None:
 
 def combine_quadrics(quadrics: Sequence[Quadric]) -> list[Quadric]:
     """Return the same span of quadrics, as many as can be without their quadratic parts."""
-    n, found = len(quadrics[0].A) - 1, []
-    for form in _reduce_forms([_form(each) for each in quadrics]):
+    n, combined = len(quadrics[0].A) - 1, []
+    for form in _reduce_forms([_read_form(quadric) for quadric in quadrics]):
         A, common = np.zeros((n + 1, n + 1), dtype=object), math.lcm(*(c.denominator for c in form.values()))
         for e, c in form.items():
             i, j = sorted([0, 0, *(k + 1 for k in range(n) for _ in range(e[k]))])[-2:]
             A[i, j] = int(c * common)
-        found.append(Quadric(A))
-    return found
+        combined.append(Quadric(A))
+    return combined
 
 
-def _form(quadric: Quadric) -> Form:
-    n, found = len(quadric.A) - 1, Form()
+def _read_form(quadric: Quadric) -> Form:
+    n, form = len(quadric.A) - 1, Form()
     for i in range(n + 1):
         for j in range(n + 1):
             if quadric.A[i, j]:
                 e = tuple(int(k + 1 == i) + int(k + 1 == j) for k in range(n))
-                found[e] = found.get(e, Fraction(0)) + Fraction(int(quadric.A[i, j]))
-    return {e: c for e, c in found.items() if c}
+                form[e] = form.get(e, Fraction(0)) + Fraction(int(quadric.A[i, j]))
+    return {e: c for e, c in form.items() if c}
 
 
-def _at(line: Form, k: int) -> Any:
+def _get_slope(line: Form, k: int) -> Any:
     """The coefficient of an unknown."""
     return next((c for e, c in line.items() if e[k] and sum(e) == 1), 0)
 
 
 def _reduce_forms(forms: Sequence[Form]) -> list[Form]:
     """Return the same span, quadratic monomials eliminated first."""
-    rows, found = [dict(form) for form in forms], list[Form]()
+    rows, reduced = [dict(form) for form in forms], list[Form]()
     columns = sorted({e for form in forms for e in form}, key=lambda e: (-sum(e), [-k for k in e]))
     for e in columns:
         pivot = next((row for row in rows if row.get(e)), None)
         if pivot is None:
             continue
-        rows = [_minus(row, pivot, row.get(e, 0) / pivot[e]) for row in rows if row is not pivot]
-        found.append(pivot)
-    return found
+        rows = [_subtract(row, pivot, row.get(e, 0) / pivot[e]) for row in rows if row is not pivot]
+        reduced.append(pivot)
+    return reduced
 
 
-def _minus(row: Form, other: Form, factor: Any) -> Form:
-    total = {e: row.get(e, 0) - factor * other.get(e, 0) for e in row.keys() | other.keys()}
+def _subtract(row: Form, second: Form, factor: Any) -> Form:
+    total = {e: row.get(e, 0) - factor * second.get(e, 0) for e in row.keys() | second.keys()}
     return {e: c for e, c in total.items() if c}
 
 
-def _line(forms: Sequence[Form]) -> Form | None:
+def _find_line(forms: Sequence[Form]) -> Form | None:
     """One of degree one at most, that with the last unknowns."""
     return next((form for form in reversed(forms) if all(sum(e) <= 1 for e in form)), None)
 
 
-def _without(form: Form, line: Form, k: int) -> Form:
+def _eliminate(form: Form, line: Form, k: int) -> Form:
     """With x_k as the line gives it."""
-    given = {e: -c / _at(line, k) for e, c in line.items() if not e[k]}
+    given = {e: -c / _get_slope(line, k) for e, c in line.items() if not e[k]}
     total = Form()
     for e, c in form.items():
         terms = {(*e[:k], 0, *e[k + 1 :]): c}
         for _ in range(e[k]):
-            terms = _times(terms, given)
-        total = _minus(total, terms, -1)
+            terms = _expand_product(terms, given)
+        total = _subtract(total, terms, -1)
     return total
 
 
-def _times(one: Form, other: Form) -> Form:
+def _expand_product(first: Form, second: Form) -> Form:
     total = Form()
-    for e, c in one.items():
-        total = _minus(total, {tuple(map(sum, zip(e, f, strict=True))): c * d for f, d in other.items()}, -1)
+    for e, c in first.items():
+        total = _subtract(total, {tuple(map(sum, zip(e, f, strict=True))): c * d for f, d in second.items()}, -1)
     return total
 
 
-def partitions(left: list[int]) -> Iterator[list[list[int]]]:
+def list_partitions(left: list[int]) -> Iterator[list[list[int]]]:
     """All ways to group unknowns."""
     if not left:
         yield []
         return
-    for rest in partitions(left[1:]):
+    for rest in list_partitions(left[1:]):
         yield [[left[0]], *rest]
         for k in range(len(rest)):
             yield [*rest[:k], [left[0], *rest[k]], *rest[k + 1 :]]
 
 
-def _least_bound(forms: Sequence[Form], groups: Sequence[Sequence[int]], enough: int) -> int | None:
+def _find_least_bound(forms: Sequence[Form], groups: Sequence[Sequence[int]], enough: int) -> int | None:
     """The least bound with some groups."""
     from flint import nmod_mat
 
-    found = None
+    least = None
     for caps in sorted(product(range(2, CAP_OF_MULTIPLES + 1), repeat=len(groups)), key=sum):
         if (
             math.prod(math.comb(len(group) + cap, cap) for group, cap in zip(groups, caps, strict=True))
@@ -157,8 +157,8 @@ def _least_bound(forms: Sequence[Form], groups: Sequence[Sequence[int]], enough:
         if not rows or nmod_mat([row[:edge] for row in rows], PRIME).rank() < edge:
             continue
         bound = len(columns) - int(nmod_mat(rows, PRIME).rank())
-        if found is None or bound < found:
-            found = bound
+        if least is None or bound < least:
+            least = bound
         if bound <= enough:
             break
-    return found
+    return least

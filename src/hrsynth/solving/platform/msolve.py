@@ -50,7 +50,7 @@ def parametrise(
     Raises ``MissingExtra`` where msolve is not installed, ``ExternalSolverFailure`` where it does not answer in
     time."""
     count = len(quadrics[0].A) - 1
-    program = executable()
+    program = find_executable()
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / "system.ms"
         source.write_text(write_system(quadrics, nonzero), encoding="ascii")
@@ -65,32 +65,32 @@ def parametrise(
             raise ExternalSolverFailure("msolve", str(error)) from error
 
 
-def executable() -> Path:
+def find_executable() -> Path:
     """The program: of the installed package, else on the path. Raises ``MissingExtra``."""
     try:
         files = importlib.metadata.files(PACKAGE) or []
     except importlib.metadata.PackageNotFoundError:
         files = []
-    found = next((Path(str(file.locate())) for file in files if file.parts[-2:] == ("bin", "msolve")), None)
-    if found is None or not found.exists():
+    path = next((Path(str(file.locate())) for file in files if file.parts[-2:] == ("bin", "msolve")), None)
+    if path is None or not path.exists():
         elsewhere = shutil.which("msolve")
         if elsewhere is None:
             raise MissingExtra("the list of poses with tips on surfaces", "solve")
         return Path(elsewhere)
-    return found
+    return path
 
 
 def write_system(quadrics: Sequence[Quadric], nonzero: Quadric | None = None) -> str:
     """The system in msolve's own format."""
     count = len(quadrics[0].A) - 1
-    names, lines = NAMES[:count], [_sum(_terms(each)) for each in quadrics]
+    names, lines = NAMES[:count], [_sum(_list_terms(quadric)) for quadric in quadrics]
     if nonzero is not None:
         names = INVERSE + names
-        lines.append(_sum({f"*{INVERSE}{power}": value for power, value in _terms(nonzero).items()} | {"": -1}))
+        lines.append(_sum({f"*{INVERSE}{power}": value for power, value in _list_terms(nonzero).items()} | {"": -1}))
     return f"{','.join(names)}\n0\n" + ",\n".join(lines) + "\n"
 
 
-def _terms(quadric: Quadric) -> dict[str, int]:
+def _list_terms(quadric: Quadric) -> dict[str, int]:
     """The coefficients of a quadric, without their common divisor, by what they are multiplied with."""
     A = quadric.A
     powers = ["", *(f"*{name}" for name in NAMES[: len(A) - 1])]
@@ -108,13 +108,13 @@ def read(text: str, count: int) -> Parametrisation | None:
     """Parse the answer of msolve for ``count`` unknowns. Raises ``ValueError`` if there is none."""
     from flint import fmpz, fmpz_poly
 
-    found = json.loads(re.sub(r"-?\d+", r'"\g<0>"', text.strip().rstrip(":").replace("'", '"')))
-    if found[0] == "-1":
+    answer = json.loads(re.sub(r"-?\d+", r'"\g<0>"', text.strip().rstrip(":").replace("'", '"')))
+    if answer[0] == "-1":
         return Parametrisation(fmpz_poly([1]), lambda t: [])
-    if found[0] == "1":
+    if answer[0] == "1":
         return None
-    names = found[1][3]
-    w, slope, rest = found[1][5][1]
+    names = answer[1][3]
+    w, slope, rest = answer[1][5][1]
 
     def polynomial(record: Sequence[Any]) -> Any:
         return fmpz_poly([fmpz(c) for c in record[1]])

@@ -17,7 +17,7 @@ from ...geometry.loci import Sphere, length
 from ...geometry.vectors import Array
 from ...tolerances import LOCUS_DISTANCE_TOL, LOCUS_EXTENT_TOL, NEAR_MODE_DISTANCE_MAX, RANK_GAP_MIN, TIP_ROUNDING
 from .constrained_platform import System
-from .quadrics import UNIT, Conic, conditions
+from .quadrics import UNIT, Conic, list_conditions
 from .rigid import Spatial
 from .roots import ROOT_ISOLATION_BITS_COUNT
 
@@ -30,22 +30,22 @@ SNAP_DISTANCE_MAX = 1e-5
 larger."""
 
 
-def tip_rounding(system: System, at: Array) -> float:
+def bound_tip_rounding(system: System, at: Array) -> float:
     """Return how far a tip that floats put at ``at`` (3,) can be from that of the exact input at the same pose (m)."""
     return system.error + TIP_ROUNDING * (system.size + length(at))
 
 
-def off(system: System, k: int, at: Array, shift: float, turn: float) -> float:
+def bound_tip_error(system: System, k: int, at: Array, shift: float, turn: float) -> float:
     """Return how far the exact tip of a leg is from ``at`` (3,) at most (m), at a pose enclosed to ``shift`` and
     ``turn``."""
-    return shift + turn * length(system.tips[k]) + tip_rounding(system, at)
+    return shift + turn * length(system.tips[k]) + bound_tip_rounding(system, at)
 
 
 def may_be_goal(system: System, q: Array, goal: Array, shift: float, turn: float) -> bool:
     """Return True if the exact pose about ``q`` can be that about ``goal``: all its tips can."""
     return all(
-        length(one - other) <= off(system, k, one, shift, turn) + tip_rounding(system, other)
-        for k, (one, other) in enumerate(zip(system.tips_at(q), system.tips_at(goal), strict=True))
+        length(tip - goal_tip) <= bound_tip_error(system, k, tip, shift, turn) + bound_tip_rounding(system, goal_tip)
+        for k, (tip, goal_tip) in enumerate(zip(system.tips_at(q), system.tips_at(goal), strict=True))
     )
 
 
@@ -59,12 +59,12 @@ def is_excluded(system: System, q: Array, shift: float, turn: float) -> bool:
     misses = np.linalg.norm(system.off(at), axis=1)
     with ctx.workprec(ROOT_ISOLATION_BITS_COUNT):
         for k in np.argsort(-misses).tolist():
-            radius = off(system, k, at[k], shift, turn)
+            radius = bound_tip_error(system, k, at[k], shift, turn)
             if misses[k] <= radius:
                 return False
             place = numbers.vector(frame.point(at[k]), radius / frame.size * UNIT)
             tip = Conic(place, place @ place, 1)
-            if any(not form.contains(0) for form in conditions(tip, system.curves[k], frame, numbers)):
+            if any(not form.contains(0) for form in list_conditions(tip, system.curves[k], frame, numbers)):
                 return True
     return False
 
@@ -79,16 +79,16 @@ def is_beyond_rigid_platform(system: System, places: Mapping[int, tuple[Array, f
     with ctx.workprec(ROOT_ISOLATION_BITS_COUNT):
         tips = {
             k: (
-                numbers.vector(frame.point(at), (miss + tip_rounding(system, at)) / frame.size * UNIT),
+                numbers.vector(frame.point(at), (miss + bound_tip_rounding(system, at)) / frame.size * UNIT),
                 numbers.vector(system.tips[k] / frame.size),
             )
             for k, (at, miss) in places.items()
         }
         arms = [(at - to, b - c) for (at, b), (to, c) in combinations(tips.values(), 2)]
-        return any(not (arm @ arm - own @ own).contains(0) for arm, own in arms)
+        return any(not (arm @ arm - side @ side).contains(0) for arm, side in arms)
 
 
-def words(goal: bool, lost: bool, fitting: Sequence[float], out: int, open_: int) -> str:
+def describe_fits(goal: bool, lost: bool, fitting: Sequence[float], out: int, open_: int) -> str:
     """Verdict of the legs on all solutions: whether one is the goal, or it is ``lost`` among them, the residuals of
     those that fit, how many are excluded and how many are undecided."""
     parts = [f"{'none' if lost else 'one'} is the goal, at which all legs fit by construction"] if goal else []
@@ -107,41 +107,41 @@ CONTINUOUS_FAMILY_STARTS_COUNT = 40
 """Number of random poses from which a pose of a continuous family is sought."""
 
 
-def residual(system: System, q: Array) -> float:
+def compute_residual(system: System, q: Array) -> float:
     """The largest distance of a tip from its curve, in sizes of the mechanism."""
     return system.residual(system.tips_at(q))
 
 
-def stationary(system: System, starts: Sequence[Array], known: Sequence[Array]) -> list[Array]:
+def find_stationary(system: System, starts: Sequence[Array], known: Sequence[Array]) -> list[Array]:
     """Poses with a small residual that is stationary, nearest to ``starts``, without those ``known``, best first."""
-    found: list[tuple[float, Array]] = []
+    ranked: list[tuple[float, Array]] = []
     seen = [np.asarray(q) for q in known]
     for start in starts:
-        if residual(system, start) > NEAR_MODE_START_MISS_MAX:
+        if compute_residual(system, start) > NEAR_MODE_START_MISS_MAX:
             continue
-        q = _least_misses(system, start)
-        miss = residual(system, q)
+        q = _fit_pose(system, start)
+        miss = compute_residual(system, q)
         if miss <= NEAR_MODE_DISTANCE_MAX and all(
-            _apart(system, q, other) > NEAR_MODE_DIFFERENCE_TOL for other in seen
+            _compare_poses(system, q, pose) > NEAR_MODE_DIFFERENCE_TOL for pose in seen
         ):
-            found.append((miss, q))
+            ranked.append((miss, q))
             seen.append(q)
-    return [q for _, q in sorted(found, key=lambda each: each[0])]
+    return [q for _, q in sorted(ranked, key=lambda item: item[0])]
 
 
-def dimension(system: System) -> int | None:
+def find_dimension(system: System) -> int | None:
     """Return the largest dimension of the real poses about one that closes; None if none is found."""
     rng = np.random.default_rng(0)
-    found = []
+    dimensions = []
     for _ in range(CONTINUOUS_FAMILY_STARTS_COUNT):
-        q = _least_misses(system, system.somewhere(rng))
-        if residual(system, q) <= LOCUS_DISTANCE_TOL:
-            values = np.linalg.svd(_slopes(system, q), compute_uv=False)
-            found.append(int(len(q) - np.sum(values > np.sqrt(LOCUS_EXTENT_TOL) * values[0])))
-    return max(found, default=None)
+        q = _fit_pose(system, system.somewhere(rng))
+        if compute_residual(system, q) <= LOCUS_DISTANCE_TOL:
+            values = np.linalg.svd(_compute_slopes(system, q), compute_uv=False)
+            dimensions.append(int(len(q) - np.sum(values > np.sqrt(LOCUS_EXTENT_TOL) * values[0])))
+    return max(dimensions, default=None)
 
 
-def _least_misses(system: System, start: Array) -> Array:
+def _fit_pose(system: System, start: Array) -> Array:
     """The pose of least squared misses next to a start."""
     from scipy.optimize import least_squares
 
@@ -149,18 +149,18 @@ def _least_misses(system: System, start: Array) -> Array:
     return np.asarray(result.x)
 
 
-def _slopes(system: System, q: Array, step: float = 1e-6) -> Array:
+def _compute_slopes(system: System, q: Array, step: float = 1e-6) -> Array:
     """Central differences of the misses; shape (3 legs, coordinates)."""
     columns = [(system.misses(q + e) - system.misses(q - e)).ravel() / (2 * step) for e in step * np.eye(len(q))]
     return np.column_stack(columns)
 
 
-def _apart(system: System, one: Array, other: Array) -> float:
+def _compare_poses(system: System, q: Array, p: Array) -> float:
     """Return the difference of two poses, or of the tips of two bodies (sizes, pure numbers)."""
-    X, Y = system.pose(one), system.pose(other)
-    moved = (X[:3, 3] - Y[:3, 3], system.misses(one) - system.misses(other))
+    X, Y = system.pose(q), system.pose(p)
+    moved = (X[:3, 3] - Y[:3, 3], system.misses(q) - system.misses(p))
     turned = float(np.abs(X[:3, :3] - Y[:3, :3]).max())
-    return max(max(float(np.abs(each).max()) for each in moved) / system.size, turned)
+    return max(max(float(np.abs(difference).max()) for difference in moved) / system.size, turned)
 
 
 @dataclass(frozen=True)
@@ -187,31 +187,31 @@ def snap_centres(system: System) -> tuple[System, tuple[SnappedPoints, ...]]:
         for where, at in points.items()
         for i, j in combinations(at, 2)
     ]
-    accepted = [each for each in apart if each[0] <= SNAP_DISTANCE_MAX * system.size]
-    largest = max((each[0] for each in accepted), default=0.0)
-    smallest = min((each[0] for each in apart if each not in accepted), default=np.inf)
+    accepted = [pair for pair in apart if pair[0] <= SNAP_DISTANCE_MAX * system.size]
+    largest = max((pair[0] for pair in accepted), default=0.0)
+    smallest = min((pair[0] for pair in apart if pair not in accepted), default=np.inf)
     if largest * RANK_GAP_MIN > smallest:
         raise GeometryAmbiguous(
             "joint centres that may coincide", largest / system.size, smallest / system.size, RANK_GAP_MIN
         )
     if largest == 0.0:
         return system, ()
-    tips, curves, told = system.tips.copy(), list(system.curves), []
+    tips, curves, snapped = system.tips.copy(), list(system.curves), []
     for where, at in points.items():
-        for group in _groups([(i, j) for _, side, i, j in accepted if side == where]):
+        for group in _join_pairs([(i, j) for _, side, i, j in accepted if side == where]):
             middle = np.mean([at[k] for k in group], axis=0)
             defect = max(d for d, side, i, _ in accepted if side == where and i in group)
             if defect > 0:
-                told.append(SnappedPoints(where, group, defect))
+                snapped.append(SnappedPoints(where, group, defect))
             for k in group:
                 if where == "platform":
                     tips[k] = middle
                 else:
                     curves[k] = replace(curves[k], centre=middle)
-    return replace(system, tips=tips, curves=tuple(curves), error=system.error + largest), tuple(told)
+    return replace(system, tips=tips, curves=tuple(curves), error=system.error + largest), tuple(snapped)
 
 
-def _groups(pairs: list[tuple[int, int]]) -> list[tuple[int, ...]]:
+def _join_pairs(pairs: list[tuple[int, int]]) -> list[tuple[int, ...]]:
     """Return those that are joined by pairs, together."""
     groups: list[set[int]] = []
     for pair in pairs:

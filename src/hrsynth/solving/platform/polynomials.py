@@ -29,14 +29,14 @@ class Equation(NamedTuple):
 
     def value(self, x: Sequence[Any]) -> Any:
         """The value at x."""
-        return _powers(x[self.i]) @ self.table @ _powers(x[self.j])
+        return _list_powers(x[self.i]) @ self.table @ _list_powers(x[self.j])
 
     def slopes(self, x: Sequence[Any]) -> list[Any]:
         """The derivative by each unknown at x."""
-        left, right = _powers(x[self.i]), _powers(x[self.j])
+        left, right = _list_powers(x[self.i]), _list_powers(x[self.j])
         row: list[Any] = [0.0] * len(x)
-        row[self.i] = _slopes(x[self.i]) @ (self.table @ right)
-        row[self.j] = row[self.j] + left @ self.table @ _slopes(x[self.j])
+        row[self.i] = _list_slopes(x[self.i]) @ (self.table @ right)
+        row[self.j] = row[self.j] + left @ self.table @ _list_slopes(x[self.j])
         return row
 
 
@@ -56,11 +56,11 @@ class Quadric(NamedTuple):
         return (self.A @ ends + ends @ self.A)[1:]
 
 
-def _powers(x: Any) -> Any:
+def _list_powers(x: Any) -> Any:
     return np.array([1, x, x * x], dtype=object)
 
 
-def _slopes(x: Any) -> Any:
+def _list_slopes(x: Any) -> Any:
     return np.array([0, 1, 2 * x], dtype=object)
 
 
@@ -83,7 +83,7 @@ class Eliminant:
     several: Callable[[Any], list[tuple[Any, ...]] | None] = lambda x: None
 
 
-def univariate(f: Sequence[int]) -> Eliminant:
+def make_univariate(f: Sequence[int]) -> Eliminant:
     """f(x) = 0: nothing to eliminate."""
     from flint import fmpz_poly
 
@@ -92,36 +92,36 @@ def univariate(f: Sequence[int]) -> Eliminant:
 
 def pair(f: Table, g: Table) -> Eliminant:
     """f(x, y) = g(x, y) = 0 with y eliminated: degree 8, or 4 where one of them is free of x."""
-    a, b = _in_second(f), _in_second(g)
+    a, b = _collect_in_second(f), _collect_in_second(g)
     top, low, mixed = a[2] * b[1] - a[1] * b[2], a[2] * b[0] - a[0] * b[2], a[1] * b[0] - a[0] * b[1]
 
     def others(x: Any) -> tuple[Any, ...]:
         return (_divide(-low(x), top(x)),)
 
     def several(x: Any) -> list[tuple[Any, ...]] | None:
-        ys = _two([p(x) for p in a])
+        ys = _solve_quadratic([p(x) for p in a])
         last = [p(x) for p in b]
         return None if ys is None else [(y,) for y in ys if (last[0] + y * (last[1] + y * last[2])).contains(0)]
 
-    bound = 2 * sum(max((p.degree() for p in each), default=0) for each in (a, b))
+    bound = 2 * sum(max((p.degree() for p in coefficients), default=0) for coefficients in (a, b))
     return Eliminant(low * low - top * mixed, bound, others, several)
 
 
-def cycle(f: Table, g: Table, h: Table) -> Eliminant:
+def eliminate_cycle(f: Table, g: Table, h: Table) -> Eliminant:
     """f(x, y) = g(y, z) = h(z, x) = 0 with y and z eliminated: degree 16.
 
     y is eliminated from f and g, which leaves degree four in z; h = a z² + b z + c brings that down to R₁ z + R₀,
     and the product of its values at the two roots of h is the eliminant.
     """
-    a, b = _in_second(f), _in_second(g.T)
-    c0, c1, c2 = _in_second(h.T)
+    a, b = _collect_in_second(f), _collect_in_second(g.T)
+    c0, c1, c2 = _collect_in_second(h.T)
     # 1: Res_y(f, g), of degree four in z, by the formula above
-    quartic = _resultant_in_third(a, b)
+    quartic = _eliminate_third(a, b)
     # 2: modulo h = c₂ z² + c₁ z + c₀ that is (R₁ z + R₀) / c₂³
     R0, R1, leading = _reduce_quartic(quartic, (c0, c1, c2))
     # 3: c₂ (R₁ z₁ + R₀) (R₁ z₂ + R₀) at the roots of h, by z₁ + z₂ = −c₁/c₂ and z₁ z₂ = c₀/c₂; c₂³ is a factor
     norm = R1 * R1 * c0 - R1 * R0 * c1 + R0 * R0 * c2
-    polynomial = norm if not norm else _exact(norm, leading)
+    polynomial = norm if not norm else _divide_exactly(norm, leading)
 
     def others(x: Any) -> tuple[Any, ...]:
         z = _divide(-R0(x), R1(x))
@@ -130,7 +130,7 @@ def cycle(f: Table, g: Table, h: Table) -> Eliminant:
         return y, z
 
     def several(x: Any) -> list[tuple[Any, ...]] | None:
-        ys, zs = _two([p(x) for p in a]), _two([p(x) for p in (c0, c1, c2)])
+        ys, zs = _solve_quadratic([p(x) for p in a]), _solve_quadratic([p(x) for p in (c0, c1, c2)])
         if ys is None or zs is None:
             return None
         return [(y, z) for y in ys for z in zs if sum(q(z) * y**k for k, q in enumerate(b)).contains(0)]
@@ -138,7 +138,7 @@ def cycle(f: Table, g: Table, h: Table) -> Eliminant:
     return Eliminant(polynomial, 16, others, several)
 
 
-def without(polynomial: fmpz_poly, factor: fmpz_poly) -> tuple[fmpz_poly, int]:
+def divide_out(polynomial: fmpz_poly, factor: fmpz_poly) -> tuple[fmpz_poly, int]:
     """The polynomial divided by a factor as often as that divides it, and how often."""
     times = 0
     while polynomial and polynomial.degree() >= factor.degree():
@@ -149,28 +149,28 @@ def without(polynomial: fmpz_poly, factor: fmpz_poly) -> tuple[fmpz_poly, int]:
     return polynomial, times
 
 
-def primitive(polynomial: fmpz_poly) -> fmpz_poly:
+def make_primitive(polynomial: fmpz_poly) -> fmpz_poly:
     """The polynomial without its content."""
     from flint import fmpz_poly
 
     return polynomial // fmpz_poly([polynomial.content()]) if polynomial else polynomial
 
 
-def height(polynomial: fmpz_poly) -> fmpz:
+def compute_height(polynomial: fmpz_poly) -> fmpz:
     """The largest absolute value of a coefficient."""
     from flint import fmpz
 
     return max((abs(c) for c in polynomial.coeffs()), default=fmpz(0))
 
 
-def _in_second(table: Table) -> list[fmpz_poly]:
+def _collect_in_second(table: Table) -> list[fmpz_poly]:
     """The coefficients of y⁰, y¹, y², as polynomials in x."""
     from flint import fmpz_poly
 
     return [fmpz_poly([int(c) for c in column]) for column in table.T]
 
 
-def _resultant_in_third(a: Sequence[fmpz_poly], b: Sequence[fmpz_poly]) -> list[fmpz_poly]:
+def _eliminate_third(a: Sequence[fmpz_poly], b: Sequence[fmpz_poly]) -> list[fmpz_poly]:
     """The resultant in y of Σ aₖ(x) yᵏ and Σ bₖ(z) yᵏ: coefficients of z⁰ … z⁴, as polynomials in x."""
     from flint import fmpz_poly
 
@@ -199,13 +199,13 @@ def _reduce_quartic(quartic: Sequence[fmpz_poly], c: Sequence[fmpz_poly]) -> tup
     return R0, R1, c[2] ** 3
 
 
-def _exact(norm: fmpz_poly, divisor: fmpz_poly) -> fmpz_poly:
+def _divide_exactly(norm: fmpz_poly, divisor: fmpz_poly) -> fmpz_poly:
     quotient, rest = divmod(norm, divisor)
     assert not rest, "a norm is divisible by the power of the leading coefficient that scaled it"
     return quotient
 
 
-def _two(c: Sequence[Any]) -> list[Any] | None:
+def _solve_quadratic(c: Sequence[Any]) -> list[Any] | None:
     """Return the two roots of c₂ y² + c₁ y + c₀ as disjoint balls; None if they cannot be separated, or are not
     finite."""
     below = c[1] * c[1] - 4 * c[2] * c[0]

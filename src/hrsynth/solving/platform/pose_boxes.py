@@ -146,8 +146,8 @@ class PoseBox:
         """Return True if no pose is in this one and in one of the others."""
         if not others:
             return True
-        radii = self.radii + np.array([other.radii for other in others])
-        far = np.abs(np.array([other.middle for other in others]) - self.alike(self.middle)[:, None]) > radii
+        radii = self.radii + np.array([box.radii for box in others])
+        far = np.abs(np.array([box.middle for box in others]) - self.alike(self.middle)[:, None]) > radii
         return bool(np.all(np.any(far, axis=2)))
 
 
@@ -162,7 +162,7 @@ def refine_poses(forms: SquareForms, y: Array, p: Array) -> Array:
         y, p = x[:, :turned], x[:, turned:] @ moves.T
         F, J = [np.sum(y * y, axis=1) - 1.0], [np.hstack([2.0 * y, 0.0 * x[:, turned:]])]
         for c, (b, a) in zip(conditions, M, strict=True):
-            by_x, by_d = (np.einsum("iab,nb->nia", each, y) for each in (b, a))
+            by_x, by_d = (np.einsum("iab,nb->nia", T, y) for T in (b, a))
             at, d = p + np.einsum("nia,na->ni", by_x, y), np.einsum("nia,na->ni", by_d, y)
             along, across = c.slopes(at, d, np.asarray)
             F.append(c.value(at, d, np.asarray))
@@ -184,52 +184,52 @@ def enclose_poses(
     turned = forms.poses.turns.shape[1]
     conditions = (*forms.planes, *forms.others)
     equations, exact = (
-        list[Polynomial]([UnitLength(range(turned)), *(Zero(c, forms.poses, each) for c in conditions)])
-        for each in (slack, None)
+        list[Polynomial]([UnitLength(range(turned)), *(Zero(c, forms.poses, errors) for c in conditions)])
+        for errors in (slack, None)
     )
-    found: list[PoseBox] = []
+    boxes: list[PoseBox] = []
     lost = 0
     with ctx.workprec(POSE_BOX_BITS_COUNT):
         for number, x in enumerate(refine_poses(forms, *proposed)):
-            if lost and len(found) + len(proposed[0]) - number < needed:
+            if lost and len(boxes) + len(proposed[0]) - number < needed:
                 break
             real = bool(np.abs(x.imag).max() < NEARLY_REAL_POSE_TOL)
-            model = None if real else at_middle([box for box in found if not box.real], x.conj())
+            model = None if real else find_box_at([box for box in boxes if not box.real], x.conj())
             if model is not None:
-                each: PoseBox | None = replace(model, middle=model.middle.conj())
+                candidate: PoseBox | None = replace(model, middle=model.middle.conj())
             elif np.all(np.isfinite(x)):
                 start = [arb(v) for v in x.real.tolist()] if real else [acb(v.real, v.imag) for v in x.tolist()]
-                each = as_box(enclose_zero(equations, start), real, turned)
-                if each is None and turned == 4 and np.abs(x.imag).max() > COMPLEX_ZERO_IMAGINARY_MIN:
-                    each = as_box(enclose_zero(exact, start), False, turned)
-                    each = None if each is None else replace(each, rounded=True)
+                candidate = make_box(enclose_zero(equations, start), real, turned)
+                if candidate is None and turned == 4 and np.abs(x.imag).max() > COMPLEX_ZERO_IMAGINARY_MIN:
+                    candidate = make_box(enclose_zero(exact, start), False, turned)
+                    candidate = None if candidate is None else replace(candidate, rounded=True)
             else:
-                each = None
-            if each is None:
+                candidate = None
+            if candidate is None:
                 lost += 1
-            elif each.is_disjoint_from(found):
-                found.append(each)
-    return found, lost
+            elif candidate.is_disjoint_from(boxes):
+                boxes.append(candidate)
+    return boxes, lost
 
 
-def at_middle(boxes: Sequence[PoseBox], x: Array) -> PoseBox | None:
+def find_box_at(boxes: Sequence[PoseBox], x: Array) -> PoseBox | None:
     """The first box of which a pose is the middle to rounding."""
     if not boxes:
         return None
     same = np.abs(np.array([box.middle for box in boxes]) - boxes[0].alike(x)[:, None]) <= (
         NEARLY_REAL_POSE_TOL * (1.0 + np.abs(x))
     )
-    found = np.nonzero(np.any(np.all(same, axis=2), axis=0))[0]
-    return boxes[found[0]] if len(found) else None
+    places = np.nonzero(np.any(np.all(same, axis=2), axis=0))[0]
+    return boxes[places[0]] if len(places) else None
 
 
-def told_far(boxes: Iterable[PoseBox]) -> str:
+def describe_far(boxes: Iterable[PoseBox]) -> str:
     """Return the number proved for the rounded geometry alone, as text."""
     far = sum(box.rounded for box in boxes)
     return f", {far} far from real ones for the rounded geometry" if far else ""
 
 
-def as_box(box: Sequence[Any] | None, real: bool, turned: int) -> PoseBox | None:
+def make_box(box: Sequence[Any] | None, real: bool, turned: int) -> PoseBox | None:
     """A box with its radii made a little larger; None where there is none, or a complex one may hold a real pose."""
     if box is None:
         return None

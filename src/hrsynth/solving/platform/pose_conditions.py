@@ -33,8 +33,8 @@ class PoseCondition:
     def rates(self) -> Array:
         """The derivative at the goal by p and by the angles of a turn, of length one; shape (6,)."""
         along, turned = self.slopes(self.b, self.c, np.asarray)
-        found = np.hstack([along, np.cross(self.b, along) + np.cross(self.c, turned)])
-        return np.asarray(found / np.linalg.norm(found))
+        rates = np.hstack([along, np.cross(self.b, along) + np.cross(self.c, turned)])
+        return np.asarray(rates / np.linalg.norm(rates))
 
     def value(self, x: Any, d: Any, of: Convert) -> Any:
         """Value at x and d, shape (..., 3), of numbers made from floats by ``of``."""

@@ -20,8 +20,8 @@ from ...geometry.vectors import Array
 from ...tolerances import BOX_SEPARATION_TOL, SOLUTION_DISTANCE_MAX
 from ..krawczyk import enclose_zero
 from .constrained_platform import System
-from .homotopy import ends
-from .infinity import beyond
+from .homotopy import find_endpoints
+from .infinity import count_beyond
 from .modular_root_bound import combine_quadrics
 from .msolve import Parametrisation, parametrise
 from .polynomials import Quadric
@@ -33,7 +33,7 @@ from .roots import (
     Solution,
     SolutionEncloser,
     SolutionSet,
-    all_solutions,
+    find_all_solutions,
     is_real,
     is_sharp,
 )
@@ -56,7 +56,7 @@ class ProposedSolutions:
     far: Array | None = None
 
 
-def wholes(system: System, number: int = 0) -> Iterator[PoseSystem]:
+def list_parts(system: System, number: int = 0) -> Iterator[PoseSystem]:
     """Yield the choices of legs with just as many equations as dof, then those with too many."""
     chart = system.chart(number)
     for size in range(1, len(system.curves) + 1):
@@ -74,27 +74,22 @@ def propose_roots(part: PoseSystem, enough: int | None) -> ProposedSolutions | N
     """All solutions, up to rounding, ``enough`` at most; None where there seem to be infinitely many.
 
     Raises ``MissingExtra``, ``ExternalSolverFailure`` where msolve is needed."""
-    return by_msolve(part) if part.chart.study is None else by_homotopy(part, enough)
+    return propose_by_msolve(part) if part.chart.study is None else propose_by_homotopy(part, enough)
 
 
-def by_homotopy(part: PoseSystem, enough: int | None) -> ProposedSolutions:
+def propose_by_homotopy(part: PoseSystem, enough: int | None) -> ProposedSolutions:
     """All poses of a rigid body, up to rounding, ``enough`` at most."""
     from flint import acb
 
     assert part.chart.study is not None
-    found = ends(part.equations(), part.chart.study, _resting(part), enough)
-    values = [[acb(v.real, v.imag) for v in row] for row in found.solutions.tolist()]
+    ends = find_endpoints(part.equations(), part.chart.study, _find_fixed_tip(part), enough)
+    values = [[acb(v.real, v.imag) for v in row] for row in ends.solutions.tolist()]
     return ProposedSolutions(
-        tuple(zip(values, found.multiple, strict=True)),
-        "homotopy",
-        found.infinite,
-        found.lost,
-        found.loose > 0,
-        found.far,
+        tuple(zip(values, ends.multiple, strict=True)), "homotopy", ends.infinite, ends.lost, ends.loose > 0, ends.far
     )
 
 
-def _resting(part: PoseSystem) -> tuple[int, ...]:
+def _find_fixed_tip(part: PoseSystem) -> tuple[int, ...]:
     """Return the indices of the three equations of a fixed tip; none if there is none."""
     counts = [3 - part.chart.reaches[k].freedoms for k in part.legs]
     first = next((k for k, leg in enumerate(part.legs) if isinstance(part.chart.reaches[leg], Point)), None)
@@ -104,7 +99,7 @@ def _resting(part: PoseSystem) -> tuple[int, ...]:
     return tuple(range(before, before + 3))
 
 
-def by_msolve(part: PoseSystem) -> ProposedSolutions | None:
+def propose_by_msolve(part: PoseSystem) -> ProposedSolutions | None:
     """All solutions, distinct ones once; None where they are infinitely many.
 
     Raises ``MissingExtra``, ``ExternalSolverFailure``."""
@@ -114,8 +109,8 @@ def by_msolve(part: PoseSystem) -> ProposedSolutions | None:
         answer, nonzero = parametrise(equations, nonzero), None
     if answer is None:
         return None
-    solutions = all_solutions(answer.polynomial, lambda t, m: _over(answer, nonzero, t, m))
-    poses = tuple(each for each in solutions if not _is_extraneous(nonzero, each[0]))
+    solutions = find_all_solutions(answer.polynomial, lambda t, m: _solve_over(answer, nonzero, t, m))
+    poses = tuple(solution for solution in solutions if not _is_extraneous(nonzero, solution[0]))
     lost = answer.polynomial.degree() - len(solutions)
     return ProposedSolutions(poses, "msolve's parametrisation", len(solutions) - len(poses), lost)
 
@@ -133,24 +128,24 @@ def enclose_roots(
 
     with ctx.workprec(ROOT_ISOLATION_BITS_COUNT):
         thick = part.equations(balls)
-    found = _Tips(balls, part.equations(), thick, part.chart).all_of(
+    roots = _Tips(balls, part.equations(), thick, part.chart).all_of(
         proposed.solutions, len(proposed.solutions) + proposed.lost, farthest
     )
     with ctx.workprec(ROOT_ISOLATION_BITS_COUNT):
-        apart = all(root.real and root.thick for root in found.real) and _has_separate_boxes(
+        apart = all(root.real and root.thick for root in roots.real) and _has_separate_boxes(
             part.chart,
             thick,
-            [root.parameters for root in found.real],
-            [values for values in found.values if not is_real(values)],
+            [root.parameters for root in roots.real],
+            [values for values in roots.values if not is_real(values)],
         )
-    if found.far and apart:
-        apart = part.chart.study is None and _has_separate_far_boxes(part, found.distant)
+    if roots.far and apart:
+        apart = part.chart.study is None and _has_separate_far_boxes(part, roots.distant)
     with ctx.workprec(ROOT_ISOLATION_BITS_COUNT):
-        wanted = most.most - found.complex if most is not None and most.law == "degree" and apart else 0
+        wanted = most.most - roots.complex if most is not None and most.law == "degree" and apart else 0
         away = 0
         if wanted > 0 and proposed.far is not None and np.isfinite(farthest):
-            away = beyond(part, balls, proposed.far, wanted)
-    return replace(found, extraneous=proposed.extraneous, apart=apart, beyond=away, method=proposed.method)
+            away = count_beyond(part, balls, proposed.far, wanted)
+    return replace(roots, extraneous=proposed.extraneous, apart=apart, beyond=away, method=proposed.method)
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,12 +178,12 @@ class _Tips(SolutionEncloser):
 
     def misses(self, own: Sequence[Any], values: Sequence[Any]) -> tuple[float, ...]:
         x = np.array([1, *values], dtype=object)
-        found = []
+        misses = []
         for tip in self._moving:
             w = (x @ tip.w @ x) * UNIT
             radii = [float(((x @ tip.N[:, :, k] @ x) / w).rad()) for k in range(tip.N.shape[2])]
-            found.append(2.0 * self.chart.frame.size * math.hypot(*radii))
-        return tuple(found)
+            misses.append(2.0 * self.chart.frame.size * math.hypot(*radii))
+        return tuple(misses)
 
 
 def _has_separate_far_boxes(part: PoseSystem, far: Sequence[Sequence[Any]]) -> bool:
@@ -202,16 +197,13 @@ def _has_separate_far_boxes(part: PoseSystem, far: Sequence[Sequence[Any]]) -> b
             sizes = [2 ** max(0, math.frexp(float(abs(v).upper()))[1]) for v in values]
             D = np.diag(np.array([1, *sizes], dtype=object))
             box = enclose_zero(
-                [Quadric(D @ each.A @ D) for each in quadrics],
+                [Quadric(D @ quadric.A @ D) for quadric in quadrics],
                 [v / size for v, size in zip(values, sizes, strict=True)],
             )
             if box is None:
                 return False
             boxes.append([v * size for v, size in zip(box, sizes, strict=True)])
-        return all(
-            any(not (v - w).contains(0) for v, w in zip(one, other, strict=True))
-            for one, other in combinations(boxes, 2)
-        )
+        return all(any(not (v - w).contains(0) for v, w in zip(a, b, strict=True)) for a, b in combinations(boxes, 2))
 
 
 def _has_separate_boxes(
@@ -220,7 +212,7 @@ def _has_separate_boxes(
     """Return True if all solutions, ``real`` ones in their boxes already, have boxes with one pose each, and no two the
     same; complex ones with their conjugates, so that none is real."""
     boxes = list(real)
-    upper = [each for each in values if next(float(v.imag) for v in each if not v.imag.is_zero()) > 0]
+    upper = [solution for solution in values if next(float(v.imag) for v in solution if not v.imag.is_zero()) > 0]
     for start in upper:
         box = enclose_zero(thick, start)
         if box is None:
@@ -249,13 +241,13 @@ def _is_pose(chart: PoseParametrization, box: Sequence[Any]) -> bool:
     return sum(float(abs(e).upper()) ** 2 for e in chart.study[:4].astype(int) @ ends) < SOLUTION_DISTANCE_MAX * least
 
 
-def _over(answer: Parametrisation, nonzero: Quadric | None, t: Any, multiplicity: int) -> list[Solution]:
+def _solve_over(answer: Parametrisation, nonzero: Quadric | None, t: Any, multiplicity: int) -> list[Solution]:
     """Return the solution over a root; none if it is not finite or not known to be a pose."""
     values = answer.others(t)
     if not all(is_sharp(v) for v in values):
         return []
-    told = nonzero is None or float(nonzero.value(values).rad()) < BALL_ZERO
-    return [(values, multiplicity)] if told else []
+    is_sure = nonzero is None or float(nonzero.value(values).rad()) < BALL_ZERO
+    return [(values, multiplicity)] if is_sure else []
 
 
 def _is_extraneous(nonzero: Quadric | None, values: Sequence[Any]) -> bool:

@@ -36,7 +36,7 @@ POINTS_PER_FORM_FRACTION = 1.15
 """Points for each form."""
 
 
-def _tensor() -> Array:
+def _make_tensor() -> Array:
     """T with R_ik = Σ T[i, k, a, b] q_a q_b for a unit quaternion; symmetric in a and b; shape (3, 3, 4, 4)."""
     T = np.zeros((3, 3, 4, 4))
     for i in range(3):
@@ -48,7 +48,7 @@ def _tensor() -> Array:
     return T
 
 
-ROTATION = _tensor()
+ROTATION = _make_tensor()
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,11 +122,11 @@ class SquareForms:
             planes.append(plane)
         rows = np.array([poses.rates(c) for c in planes]).reshape(-1, poses.freedoms)
         others = list[PoseCondition]()
-        for each in sorted(rest, key=lambda c: c.degree):
-            rate = poses.rates(each)
+        for condition in sorted(rest, key=lambda c: c.degree):
+            rate = poses.rates(condition)
             more = np.vstack([rows, rate / max(float(np.linalg.norm(rate)), INDEPENDENT_RATES_MIN)])
             if len(rows) < poses.freedoms and np.linalg.svd(more, compute_uv=False)[-1] > INDEPENDENT_RATES_MIN:
-                rows, others = more, [*others, each]
+                rows, others = more, [*others, condition]
         if len(rows) < poses.freedoms:
             return None
         free = np.linalg.svd(np.vstack([basis, np.zeros((1, basis.shape[1]))]))[2][len(planes) :].T
@@ -158,7 +158,7 @@ class SquareForms:
     @property
     def size(self) -> int:
         """Number of forms of that degree."""
-        return len(exponents(self.shape, self.degree))
+        return len(list_exponents(self.shape, self.degree))
 
     @cached_property
     def system(self) -> Array:
@@ -176,21 +176,21 @@ class SquareForms:
 
 
 @lru_cache(maxsize=64)
-def exponents(shape: tuple[int, int], t: int) -> Array:
+def list_exponents(shape: tuple[int, int], t: int) -> Array:
     """The exponents of q and s in the monomials of a degree; shape (n, a + m)."""
     a, m = shape
-    found = [
+    exponents = [
         (*first, r - sum(first), *s)
         for s in product(range(t // 2 + 1), repeat=m)
         if (r := t - 2 * sum(s)) >= 0
         for first in product(range(r + 1), repeat=a - 1)
         if sum(first) <= r
     ]
-    return np.array(found, dtype=int).reshape(-1, a + m)
+    return np.array(exponents, dtype=int).reshape(-1, a + m)
 
 
 @lru_cache(maxsize=16)
-def _points(shape: tuple[int, int], count: int) -> tuple[Array, Array]:
+def _sample_points(shape: tuple[int, int], count: int) -> tuple[Array, Array]:
     """Random unit vectors (n, a) and free coordinates (n, m)."""
     rng = np.random.default_rng(0)
     y = rng.normal(size=(count, shape[0]))
@@ -200,35 +200,35 @@ def _points(shape: tuple[int, int], count: int) -> tuple[Array, Array]:
 
 
 @lru_cache(maxsize=64)
-def _basis(shape: tuple[int, int], t: int, count: int) -> Array:
+def _build_basis(shape: tuple[int, int], t: int, count: int) -> Array:
     """Orthonormal values (points, forms) of the forms of a degree."""
-    x = np.hstack(_points(shape, count))
-    values = np.prod(x[:, None, :] ** exponents(shape, t)[None], axis=2)
+    x = np.hstack(_sample_points(shape, count))
+    values = np.prod(x[:, None, :] ** list_exponents(shape, t)[None], axis=2)
     return np.asarray(np.linalg.qr(values / np.linalg.norm(values, axis=0))[0])
 
 
 @lru_cache(maxsize=64)
-def _times(shape: tuple[int, int], t: int, count: int, what: str) -> Array:
+def _build_products(shape: tuple[int, int], t: int, count: int, what: str) -> Array:
     """Multiplication of lower forms by each of what is named: y, s, or w = 1 on the points; (n, lower forms, forms)."""
-    y, s = _points(shape, count)
+    y, s = _sample_points(shape, count)
     by = {"y": y.T, "s": s.T, "w": np.ones((1, count))}[what]
-    high, low = _basis(shape, t, count), _basis(shape, t - (1 if what == "y" else 2), count)
-    return np.array([(low * each[:, None]).T @ high for each in by]).reshape(-1, low.shape[1], high.shape[1])
+    high, low = _build_basis(shape, t, count), _build_basis(shape, t - (1 if what == "y" else 2), count)
+    return np.array([(low * factor[:, None]).T @ high for factor in by]).reshape(-1, low.shape[1], high.shape[1])
 
 
-def proposals(forms: SquareForms, t: int, number: int, k: int) -> tuple[Array, Array] | None:
+def propose_poses(forms: SquareForms, t: int, number: int, k: int) -> tuple[Array, Array] | None:
     """Return all poses to rounding, from the forms of degree t, ``number`` of them on the multiples of wᵏ: coordinates
     y (n, a), of unit quaternions, complex, and positions (n, 3); None if they are not separated, or if there are more
     functionals than isolated zeros could span: some zeros are not isolated, and then these are fewer."""
     from scipy.linalg import lstsq, qr
 
     shape = forms.shape
-    size = len(exponents(shape, t))
+    size = len(list_exponents(shape, t))
     count = int(POINTS_PER_FORM_FRACTION * size) + 10
-    y, s = _points(shape, count)
-    high, R = _basis(shape, t, count), forms.poses.rotations(y)
+    y, s = _sample_points(shape, count)
+    high, R = _build_basis(shape, t, count), forms.poses.rotations(y)
     rows = [
-        (_basis(shape, t - degree, count) * (values / np.abs(values).max())[:, None]).T @ high
+        (_build_basis(shape, t - degree, count) * (values / np.abs(values).max())[:, None]).T @ high
         for values, degree in zip(forms.values(R, forms.position(R, s)), forms.degrees, strict=True)
     ]
     space = np.eye(size)
@@ -237,25 +237,25 @@ def proposals(forms: SquareForms, t: int, number: int, k: int) -> tuple[Array, A
         pivots = np.abs(np.diag(upper))
         space = Q[:, int(np.sum(pivots > FORM_PIVOT_MIN_FRACTION * pivots[0])) :]
     for step in range(k):
-        space = _times(shape, t - 2 * step, count, "w")[0] @ space
+        space = _build_products(shape, t - 2 * step, count, "w")[0] @ space
     if space.shape[1] < number or (not k and space.shape[1] > number):
         return None
     if k:
         space = decompose_matrix(space)[0][:, :number]
     t -= 2 * k
-    by_w, by_s = (_times(shape, t, count, what) @ space for what in "ws")
-    shifted = _times(shape, t, count, "y") @ space if shape[0] > 1 else np.concatenate([by_w, by_s])
-    one, other = np.einsum("cj,jnd->cnd", np.random.default_rng(1).normal(size=(2, len(shifted))), shifted)
-    _, X = np.linalg.eig(lstsq(one, other)[0])
+    by_w, by_s = (_build_products(shape, t, count, what) @ space for what in "ws")
+    shifted = _build_products(shape, t, count, "y") @ space if shape[0] > 1 else np.concatenate([by_w, by_s])
+    first, second = np.einsum("cj,jnd->cnd", np.random.default_rng(1).normal(size=(2, len(shifted))), shifted)
+    _, X = np.linalg.eig(lstsq(first, second)[0])
     if shape[0] > 1:
-        at = one @ X
-        found = np.einsum("nd,jnd->dj", at.conj(), shifted @ X)
-        found = found / np.linalg.norm(found, axis=1)[:, None]
+        at = first @ X
+        values = np.einsum("nd,jnd->dj", at.conj(), shifted @ X)
+        values = values / np.linalg.norm(values, axis=1)[:, None]
     else:
-        found = np.ones((space.shape[1], 1), dtype=complex)
-    norms = np.sum(found * found, axis=1)
+        values = np.ones((space.shape[1], 1), dtype=complex)
+    norms = np.sum(values * values, axis=1)
     real = np.abs(norms) > EXTRANEOUS_QUATERNION_TOL
     unit = by_w[0] @ X[:, real]
-    free = [np.sum(unit.conj() * each, axis=0) / np.sum(unit.conj() * unit, axis=0) for each in by_s @ X[:, real]]
-    found = found[real] / np.sqrt(norms[real])[:, None]
-    return found, forms.position(forms.poses.rotations(found), np.array(free).reshape(shape[1], len(found)).T)
+    free = [np.sum(unit.conj() * s, axis=0) / np.sum(unit.conj() * unit, axis=0) for s in by_s @ X[:, real]]
+    values = values[real] / np.sqrt(norms[real])[:, None]
+    return values, forms.position(forms.poses.rotations(values), np.array(free).reshape(shape[1], len(values)).T)

@@ -64,24 +64,24 @@ class WorkingFrame:
         return self.vector(p - self.origin)
 
 
-def spatial_frame(curves: Sequence[Reach], size: float) -> WorkingFrame:
+def choose_frame(curves: Sequence[Reach], size: float) -> WorkingFrame:
     """A frame whose third axis is the direction that most share, circles first; size rounded to a power of 2."""
     directions = [curve.axis for curve in curves if isinstance(curve, Circle)]
     directions += [curve.direction for curve in curves if isinstance(curve, Line)]
     directions += [curve.normal for curve in curves if isinstance(curve, Plane)]
     shared = [sum(_is_parallel(a, b) for b in directions) for a in directions]
     n = directions[int(np.argmax(shared))] if directions else np.array([0.0, 0.0, 1.0])
-    return WorkingFrame(_middle(curves), np.array([*build_plane_axes(n), n]), _power(size), n)
+    return WorkingFrame(_compute_middle(curves), np.array([*build_plane_axes(n), n]), _round_to_power(size), n)
 
 
-def planar_frame(curves: Sequence[Reach], X_plane: Array, size: float) -> WorkingFrame:
+def choose_planar_frame(curves: Sequence[Reach], X_plane: Array, size: float) -> WorkingFrame:
     """Two axes in the plane of X_plane (4, 4), the first along the direction that most lines share."""
     lines = [curve.direction for curve in curves if isinstance(curve, Line)]
     shared = [sum(_is_parallel(a, b) for b in lines) for a in lines]
     first = lines[int(np.argmax(shared))] if lines else X_plane[:3, 0]
     n = X_plane[:3, 2]
     axes = build_plane_axes(n, first)
-    return WorkingFrame(_middle(curves), axes, _power(size), axes[0])
+    return WorkingFrame(_compute_middle(curves), axes, _round_to_power(size), axes[0])
 
 
 class RoundedConic:
@@ -113,15 +113,15 @@ Balls = Within(WORKING_FRAME_ROUNDING_TOL)
 Numbers = type[RoundedConic] | Within
 
 
-def conic(curve: Curve, frame: WorkingFrame, turn: float, numbers: Numbers = RoundedConic) -> Conic:
+def build_conic(curve: Curve, frame: WorkingFrame, turn: float, numbers: Numbers = RoundedConic) -> Conic:
     """A curve in a working frame; t = 0 is at θ = ``turn`` on a circle, at s = 0 on a line."""
     c = numbers.vector(frame.point(curve.centre))
     zero = c * 0
     if isinstance(curve, Line):
-        d = direction(curve.direction, frame, numbers)
+        d = convert_direction(curve.direction, frame, numbers)
         return Conic(np.array([c, d, zero]), np.array([c @ c, 2 * (c @ d), d @ d]), np.array([1, 0, 0], dtype=object))
     if isinstance(curve, Circle):
-        a, b = spokes(curve, frame, turn, numbers)
+        a, b = build_spokes(curve, frame, turn, numbers)
         rho = a @ a
         Q = [c @ c + rho + 2 * (c @ a), 4 * (c @ b), c @ c + rho - 2 * (c @ a)]
         return Conic(np.array([c + a, 2 * b, c - a]), np.array(Q), np.array([1, 0, 1], dtype=object))
@@ -129,7 +129,7 @@ def conic(curve: Curve, frame: WorkingFrame, turn: float, numbers: Numbers = Rou
     return Conic(np.array([c, zero, zero]), np.array([c @ c, nothing, nothing]), np.array([1, 0, 0], dtype=object))
 
 
-def direction(along: Array, frame: WorkingFrame, numbers: Numbers) -> Any:
+def convert_direction(along: Array, frame: WorkingFrame, numbers: Numbers) -> Any:
     """A unit direction as numbers, made exact where it nearly is the frame's own or normal to that."""
     d = frame.R @ along
     if _is_parallel(along, frame.special):
@@ -139,14 +139,14 @@ def direction(along: Array, frame: WorkingFrame, numbers: Numbers) -> Any:
     return numbers.vector(d)
 
 
-def parameter(curve: Curve, frame: WorkingFrame, turn: float, t: Any) -> Any:
+def convert_parameter(curve: Curve, frame: WorkingFrame, turn: float, t: Any) -> Any:
     """The curve's own parameter, s in metres or θ in radians, of the conic's t: a ball of a ball."""
     from flint import arb
 
     return 2 * t.atan() + arb(turn) if isinstance(curve, Circle) else t * arb(frame.size)
 
 
-def spokes(circle: Circle, frame: WorkingFrame, turn: float, numbers: Numbers) -> tuple[Any, Any]:
+def build_spokes(circle: Circle, frame: WorkingFrame, turn: float, numbers: Numbers) -> tuple[Any, Any]:
     """Spokes a ⟂ b of equal length with tip = c + a cos φ + b sin φ, φ = θ − ``turn``, exactly so where planes are
     shared."""
     assert circle.start is not None
@@ -164,7 +164,7 @@ def spokes(circle: Circle, frame: WorkingFrame, turn: float, numbers: Numbers) -
     return numbers.vector(a), numbers.vector(b)
 
 
-def distance(one: Conic, other: Conic, squared: Any) -> Any:
+def build_distance(one: Conic, other: Conic, squared: Any) -> Any:
     """The table of |tip₁ − tip₂|² = ``squared``."""
     return (
         np.outer(one.Q, other.w)
@@ -174,12 +174,12 @@ def distance(one: Conic, other: Conic, squared: Any) -> Any:
     )
 
 
-def on_plane(one: Conic, normal: Any, offset: Any) -> Any:
+def put_on_plane(one: Conic, normal: Any, offset: Any) -> Any:
     """The quadratic of normal · tip = ``offset``."""
     return one.N @ normal - offset * one.w
 
 
-def on_sphere(one: Conic, centre: Any, squared: Any) -> Any:
+def put_on_sphere(one: Conic, centre: Any, squared: Any) -> Any:
     """The quadratic of |tip − centre|² = ``squared``."""
     return one.Q - 2 * (one.N @ centre) + (centre @ centre - squared) * one.w
 
@@ -192,13 +192,13 @@ def sum_on_plane(one: Conic, other: Conic, sign: int, normal: Any, offset: Any) 
 def sum_on_sphere(one: Conic, other: Conic, sign: int, centre: Any, squared: Any) -> Any:
     """The table of |tip₁ ± tip₂ − centre|² = ``squared``."""
     return (
-        np.outer(on_sphere(one, centre, squared), other.w)
+        np.outer(put_on_sphere(one, centre, squared), other.w)
         + np.outer(one.w, other.Q - sign * 2 * (other.N @ centre))
         + sign * 2 * (one.N @ other.N.T)
     )
 
 
-def _middle(curves: Sequence[Reach]) -> Array:
+def _compute_middle(curves: Sequence[Reach]) -> Array:
     return np.asarray(sum(curve.centre for curve in curves) / len(curves))
 
 
@@ -210,7 +210,7 @@ def _is_equal(a: Array, b: Array) -> bool:
     return length(cross(a, b)) < 1e-15
 
 
-def _power(size: float) -> float:
+def _round_to_power(size: float) -> float:
     """The power of two next above a size."""
     return float(2.0 ** np.ceil(np.log2(size)))
 
@@ -261,7 +261,7 @@ class PoseSystem:
         """The quadrics, first those of the coordinates themselves."""
         chart = self.chart
         tips = chart.tips(numbers)
-        groups = [conditions(tips[k], chart.reaches[k], chart.frame, numbers) for k in self.legs]
+        groups = [list_conditions(tips[k], chart.reaches[k], chart.frame, numbers) for k in self.legs]
         needed = chart.count - len(chart.own) - sum(map(len, groups[:-1]))
         return [
             Quadric(A)
@@ -269,41 +269,41 @@ class PoseSystem:
         ]
 
 
-def conditions(tip: Conic, reach: Reach, frame: WorkingFrame, numbers: Numbers) -> list[Any]:
+def list_conditions(tip: Conic, reach: Reach, frame: WorkingFrame, numbers: Numbers) -> list[Any]:
     """The forms that vanish where a tip is within its reach."""
     centre = numbers.vector(frame.point(reach.centre))
     if isinstance(reach, Point):
-        return [on_plane(tip, axis, axis @ centre) for axis in np.eye(len(centre), dtype=int).astype(object)]
+        return [put_on_plane(tip, axis, axis @ centre) for axis in np.eye(len(centre), dtype=int).astype(object)]
     if isinstance(reach, Sphere):
-        return [_at_distance(tip, reach.radius, centre, frame, numbers)]
+        return [_put_at_distance(tip, reach.radius, centre, frame, numbers)]
     flat = len(centre) == 2
     if isinstance(reach, Circle):
-        sphere = _at_distance(tip, reach.radius, centre, frame, numbers)
-        return [sphere] if flat else [_across(tip, reach.axis, centre, frame, numbers), sphere]
+        sphere = _put_at_distance(tip, reach.radius, centre, frame, numbers)
+        return [sphere] if flat else [_put_across(tip, reach.axis, centre, frame, numbers), sphere]
     if isinstance(reach, Line):
         if flat:
-            d = direction(reach.direction, frame, numbers)
+            d = convert_direction(reach.direction, frame, numbers)
             normal = np.array([-d[1], d[0]], dtype=object)
-            return [on_plane(tip, normal, normal @ centre)]
-        return [_across(tip, n, centre, frame, numbers) for n in normals(reach)]
-    return [_across(tip, reach.normal, centre, frame, numbers)]
+            return [put_on_plane(tip, normal, normal @ centre)]
+        return [_put_across(tip, n, centre, frame, numbers) for n in list_normals(reach)]
+    return [_put_across(tip, reach.normal, centre, frame, numbers)]
 
 
-def normals(reach: Line | Circle | Plane) -> tuple[Array, ...]:
+def list_normals(reach: Line | Circle | Plane) -> tuple[Array, ...]:
     """The normal of a plane or of a circle's, or of two planes that hold a line."""
     if isinstance(reach, Line):
         return tuple(build_plane_axes(reach.direction))
     return (reach.axis if isinstance(reach, Circle) else reach.normal,)
 
 
-def _across(tip: Conic, normal: Array, centre: Any, frame: WorkingFrame, numbers: Numbers) -> Any:
-    n = direction(normal, frame, numbers)
-    return on_plane(tip, n, n @ centre)
+def _put_across(tip: Conic, normal: Array, centre: Any, frame: WorkingFrame, numbers: Numbers) -> Any:
+    n = convert_direction(normal, frame, numbers)
+    return put_on_plane(tip, n, n @ centre)
 
 
-def _at_distance(tip: Conic, radius: float, centre: Any, frame: WorkingFrame, numbers: Numbers) -> Any:
+def _put_at_distance(tip: Conic, radius: float, centre: Any, frame: WorkingFrame, numbers: Numbers) -> Any:
     rho = numbers.vector(np.array([radius / frame.size]))[0]
-    return on_sphere(tip, centre, rho * rho)
+    return put_on_sphere(tip, centre, rho * rho)
 
 
 def _combine(forms: Sequence[Any], needed: int) -> list[Any]:
@@ -313,7 +313,7 @@ def _combine(forms: Sequence[Any], needed: int) -> list[Any]:
     return [sum((2 * ((k + 1) * (row + 2) % 5) + 1) * form for k, form in enumerate(forms)) for row in range(needed)]
 
 
-def linear(count: int, slopes: Sequence[tuple[int, Any]], offset: Any) -> Any:
+def build_linear(count: int, slopes: Sequence[tuple[int, Any]], offset: Any) -> Any:
     """The form offset + Σ slope · x_k (vectors allowed), k from 1 on; shape (count + 1, count + 1, ...)."""
     offset = np.asarray(offset, dtype=object)
     form = np.zeros((count + 1, count + 1, *offset.shape), dtype=object)
@@ -323,26 +323,26 @@ def linear(count: int, slopes: Sequence[tuple[int, Any]], offset: Any) -> Any:
     return form
 
 
-def shifting(count: int, offset: Any, turns: Sequence[tuple[int, Any]] = ()) -> MovingPoint:
+def build_shifting(count: int, offset: Any, turns: Sequence[tuple[int, Any]] = ()) -> MovingPoint:
     """The tip UNIT p + offset + Σ x_k v_k, with p the first coordinates and (k, v_k) the turns; where there are two of
     them, x_k² + x_l² = 1 and they are spokes, normal to each other and of one length; one is a slide."""
     d = len(offset)
     axes = np.eye(d, dtype=int).astype(object) * UNIT
     moves = [*((k + 1, axis) for k, axis in enumerate(axes)), *turns]
-    N = linear(count, moves, offset)
+    N = build_linear(count, moves, offset)
     square = offset @ offset + (turns[0][1] @ turns[0][1] if len(turns) == 2 else 0)
-    Q = linear(count, [(k, 2 * (v @ offset)) for k, v in moves], square)
+    Q = build_linear(count, [(k, 2 * (v @ offset)) for k, v in moves], square)
     if len(turns) == 1:
         Q[turns[0][0], turns[0][0]] = turns[0][1] @ turns[0][1]
     for k in range(1, d + 1):
         Q[k, k] = UNIT * UNIT
-        for other, v in turns:
-            Q[k, other] = 2 * UNIT * v[k - 1]
-    return MovingPoint(N, Q, linear(count, (), 1))
+        for place, v in turns:
+            Q[k, place] = 2 * UNIT * v[k - 1]
+    return MovingPoint(N, Q, build_linear(count, (), 1))
 
 
-def on_circle(count: int, cosine: int, sine: int) -> Any:
+def put_on_circle(count: int, cosine: int, sine: int) -> Any:
     """cos² + sin² = 1."""
-    form = linear(count, (), -1)
+    form = build_linear(count, (), -1)
     form[cosine, cosine] = form[sine, sine] = 1
     return form

@@ -25,16 +25,16 @@ from .quadrics import (
     Numbers,
     PoseParametrization,
     WorkingFrame,
-    direction,
-    distance,
-    on_circle,
-    on_sphere,
-    planar_frame,
-    shifting,
-    spatial_frame,
+    build_distance,
+    build_shifting,
+    choose_frame,
+    choose_planar_frame,
+    convert_direction,
+    put_on_circle,
+    put_on_sphere,
 )
-from .square_systems import SquareSystem, resting, single
-from .study_coordinates import study
+from .square_systems import SquareSystem, make_fixed_square, make_single
+from .study_coordinates import build_study_chart
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -79,11 +79,11 @@ class Planar(System):
     def tips_at(self, q: Array) -> Array:
         """Return the positions of the tips at a pose, each in the plane of its own curve; shape (legs, 3), metres."""
         X, n = self.pose(q), self.X_plane[:3, 2]
-        found = []
+        tips = []
         for curve, tip in zip(self.curves, self.tips, strict=True):
             at = X[:3, 3] + X[:3, :2] @ tip
-            found.append(at - n * float(n @ (at - curve.centre)))
-        return np.array(found)
+            tips.append(at - n * float(n @ (at - curve.centre)))
+        return np.array(tips)
 
     def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:
         """Return how far the platform's frame (m) and rotation (rad) can be from those at q; see ``registered``."""
@@ -92,25 +92,25 @@ class Planar(System):
     @cached_property
     def frame(self) -> WorkingFrame:
         """A working frame in the plane of motion."""
-        return planar_frame(self.curves, self.X_plane, self.size)
+        return choose_planar_frame(self.curves, self.X_plane, self.size)
 
     def chart(self, number: int) -> PoseParametrization:
         """x, y, cos and sin of the turn from the working frame to the platform's."""
         frame = self.frame
 
         def tips(numbers: Numbers) -> list[MovingPoint]:
-            found = []
+            points = []
             for tip in self.tips:
                 b = numbers.vector(tip / frame.size)
-                found.append(shifting(4, b * 0, ((3, b), (4, np.array([-b[1], b[0]], dtype=object)))))
-            return found
+                points.append(build_shifting(4, b * 0, ((3, b), (4, np.array([-b[1], b[0]], dtype=object)))))
+            return points
 
         def place(x: Sequence[float]) -> Array:
             at = frame.origin + frame.size * (np.array(x[:2]) @ frame.R)
             first = self.X_plane[:3, :2].T @ (np.array(x[2:]) @ frame.R)
             return np.array([*self.position(at), math.atan2(first[1], first[0])])
 
-        return PoseParametrization(frame, 4, self.curves, tips, (on_circle(4, 3, 4),), place)
+        return PoseParametrization(frame, 4, self.curves, tips, (put_on_circle(4, 3, 4),), place)
 
     def squares(self) -> Iterator[SquareSystem]:
         """Two pivots, a pivot and a curve, or three curves in each order that two tips apart allow."""
@@ -119,7 +119,7 @@ class Planar(System):
         apart = POINT_DISTANCE_TOL * self.size
         for i, j in combinations(points, 2):
             if length(self.tips[i] - self.tips[j]) > apart:
-                yield resting((i, j), self._square((i, j), False).place(()), False)
+                yield make_fixed_square((i, j), self._square((i, j), False).place(()), False)
         for i, j in ((i, j) for i in points for j in moving):
             if length(self.tips[i] - self.tips[j]) > apart:
                 yield self._square((i, j), len(self.curves) == 2)
@@ -131,16 +131,16 @@ class Planar(System):
     def _square(self, legs: tuple[int, ...], whole: bool) -> SquareSystem:
         curves = tuple(curve for k in legs if not isinstance(curve := self.curves[k], Surface))
         b = self.tips[list(legs)]
-        frame = planar_frame(curves, self.X_plane, extent(curves, b))
+        frame = choose_planar_frame(curves, self.X_plane, extent(curves, b))
 
         def build(conics: Sequence[Conic], numbers: Numbers) -> list[Equation]:
             tips = [numbers.vector(tip / frame.size) for tip in b]
             arm = tips[1] - tips[0]
             if len(legs) == 2:
                 held = numbers.vector(frame.point(curves[0].centre))
-                return [single(on_sphere(conics[0], held, arm @ arm))]
-            f = distance(conics[0], conics[1], arm @ arm)
-            return [Equation(f, 0, 1), Equation(_third(conics, tips, curves[2], frame, numbers), 0, 1)]
+                return [make_single(put_on_sphere(conics[0], held, arm @ arm))]
+            f = build_distance(conics[0], conics[1], arm @ arm)
+            return [Equation(f, 0, 1), Equation(_build_third(conics, tips, curves[2], frame, numbers), 0, 1)]
 
         def place(parameters: Sequence[float]) -> Array:
             free = iter(parameters)
@@ -154,31 +154,33 @@ class Planar(System):
         return SquareSystem(legs, unknowns, frame, build, place, whole)
 
 
-def _third(conics: Sequence[Conic], tips: Sequence[Any], curve: Curve, frame: WorkingFrame, numbers: Numbers) -> Any:
+def _build_third(
+    conics: Sequence[Conic], tips: Sequence[Any], curve: Curve, frame: WorkingFrame, numbers: Numbers
+) -> Any:
     """The table of *tip₃ on its curve*, with γ tip₃ = α tip₁ + β tip₂ in complex numbers: α = b₂ − b₃, β = b₃ − b₁."""
-    alpha, beta, gamma = (_complex(v) for v in (tips[1] - tips[2], tips[2] - tips[0], tips[1] - tips[0]))
-    one, other = conics
+    alpha, beta, gamma = (_build_multiplication(v) for v in (tips[1] - tips[2], tips[2] - tips[0], tips[1] - tips[0]))
+    first, second = conics
     scale = (gamma.T @ gamma)[0, 0]
     centre = numbers.vector(frame.point(curve.centre))
     if isinstance(curve, Line):
         # n · (γ̄ γ tip₃) = |γ|² n · c, with n normal to the line through c
-        d = direction(curve.direction, frame, numbers)
+        d = convert_direction(curve.direction, frame, numbers)
         normal = np.array([-d[1], d[0]])
-        first, second = alpha.T @ gamma @ normal, beta.T @ gamma @ normal
+        a, b = alpha.T @ gamma @ normal, beta.T @ gamma @ normal
         return (
-            np.outer(one.N @ first, other.w)
-            + np.outer(one.w, other.N @ second)
-            - scale * (normal @ centre) * np.outer(one.w, other.w)
+            np.outer(first.N @ a, second.w)
+            + np.outer(first.w, second.N @ b)
+            - scale * (normal @ centre) * np.outer(first.w, second.w)
         )
     assert isinstance(curve, Circle)
     # |α tip₁ + β tip₂ − γ c|² = |γ|² ρ²
     rho = numbers.vector(np.array([curve.radius / frame.size]))[0]
-    first, second = alpha.T @ gamma @ centre, beta.T @ gamma @ centre
+    a, b = alpha.T @ gamma @ centre, beta.T @ gamma @ centre
     return (
-        np.outer((alpha.T @ alpha)[0, 0] * one.Q - 2 * (one.N @ first), other.w)
-        + np.outer(one.w, (beta.T @ beta)[0, 0] * other.Q - 2 * (other.N @ second))
-        + 2 * (one.N @ (alpha.T @ beta) @ other.N.T)
-        + scale * (centre @ centre - rho * rho) * np.outer(one.w, other.w)
+        np.outer((alpha.T @ alpha)[0, 0] * first.Q - 2 * (first.N @ a), second.w)
+        + np.outer(first.w, (beta.T @ beta)[0, 0] * second.Q - 2 * (second.N @ b))
+        + 2 * (first.N @ (alpha.T @ beta) @ second.N.T)
+        + scale * (centre @ centre - rho * rho) * np.outer(first.w, second.w)
     )
 
 
@@ -188,7 +190,7 @@ def _turn_vector(turn: complex, v: Array) -> tuple[float, float]:
     return product.real, product.imag
 
 
-def _complex(v: Any) -> Any:
+def _build_multiplication(v: Any) -> Any:
     """Multiplication by the complex number v, as a matrix; shape (2, 2)."""
     return np.array([[v[0], -v[1]], [v[1], v[0]]], dtype=object)
 
@@ -227,7 +229,7 @@ class Spatial(System):
 
     def chart(self, number: int) -> PoseParametrization:
         """Study's coordinates, with a linear form of the quaternion that depends on the number made 1."""
-        return study(self.curves, self.tips, self.size, number, self.arrows, self.hub)
+        return build_study_chart(self.curves, self.tips, self.size, number, self.arrows, self.hub)
 
     def squares(self) -> Iterator[SquareSystem]:
         """Yield three fixed tips; two, one or none and as many curves as make three, with tips not on one line."""
@@ -246,7 +248,7 @@ class Spatial(System):
         curves = tuple(curve for k in legs if not isinstance(curve := self.curves[k], Surface))
         b = self.tips[list(legs)]
         unknowns = tuple(curve for curve in curves if not isinstance(curve, Point))
-        frame = spatial_frame(curves, extent(curves, b))
+        frame = choose_frame(curves, extent(curves, b))
 
         def build(conics: Sequence[Conic], numbers: Numbers) -> list[Equation]:
             tips = [numbers.vector(tip / frame.size) for tip in b]
@@ -255,26 +257,26 @@ class Spatial(System):
                 return []
             if len(unknowns) == 1:
                 held = numbers.vector(frame.point(curves[1].centre))
-                return [single(on_sphere(conics[0], held, arms[0][2] @ arms[0][2]))]
+                return [make_single(put_on_sphere(conics[0], held, arms[0][2] @ arms[0][2]))]
             if len(unknowns) == 2:
                 held = numbers.vector(frame.point(curves[2].centre))
-                reach = on_sphere(conics[1], held, arms[1][2] @ arms[1][2])
+                reach = put_on_sphere(conics[1], held, arms[1][2] @ arms[1][2])
                 return [
-                    Equation(distance(conics[0], conics[1], arms[0][2] @ arms[0][2]), 0, 1),
+                    Equation(build_distance(conics[0], conics[1], arms[0][2] @ arms[0][2]), 0, 1),
                     Equation(np.outer(np.array([1, 0, 0], dtype=object), reach), 0, 1),
                 ]
-            return [Equation(distance(conics[i], conics[j], v @ v), i, j) for i, j, v in arms]
+            return [Equation(build_distance(conics[i], conics[j], v @ v), i, j) for i, j, v in arms]
 
         def place(parameters: Sequence[float]) -> Array:
             free = iter(parameters)
             three = np.array([curve.at(0.0 if isinstance(curve, Point) else next(free)) for curve in curves])
-            R = _triad(three) @ _triad(b).T
+            R = _build_triad(three) @ _build_triad(b).T
             return np.array([*(three.mean(axis=0) - R @ b.mean(axis=0)), *convert_rotations_to_vectors(R)])
 
         return SquareSystem(legs, unknowns, frame, build, place, whole)
 
 
-def _triad(points: Array) -> Array:
+def _build_triad(points: Array) -> Array:
     """A right-handed triad of three points, equal for congruent ones; its columns, shape (3, 3)."""
     first, second = points[1] - points[0], points[2] - points[0]
     e = first / length(first)

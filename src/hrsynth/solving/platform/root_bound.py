@@ -31,7 +31,7 @@ import numpy as np
 
 from ...geometry.loci import Circle, Line, Plane, Point, Sphere
 from .constrained_platform import System
-from .quadrics import UNIT, direction, normals
+from .quadrics import UNIT, convert_direction, list_normals
 from .rigid import Spatial
 from .roots import ROOT_ISOLATION_BITS_COUNT
 from .translating import ArticulatedPlatform
@@ -80,17 +80,17 @@ class _Condition:
         return a, b, c
 
 
-def least_bound(system: System, legs: Sequence[int]) -> Bound | None:
+def find_least_bound(system: System, legs: Sequence[int]) -> Bound | None:
     """Return a bound of the complex poses that meet the conditions of as many legs as dof, if they are finitely many,
     and its proof; None if it is not known."""
     if sum(system.forbids[k] for k in legs) != system.freedoms:
         return None
     if isinstance(system, Spatial):
-        return _of_a_body(system, legs)
-    return _of_two_bodies(system, legs) if isinstance(system, ArticulatedPlatform) else None
+        return _bound_body(system, legs)
+    return _bound_two_bodies(system, legs) if isinstance(system, ArticulatedPlatform) else None
 
 
-def _of_two_bodies(system: ArticulatedPlatform, legs: Sequence[int]) -> Bound | None:
+def _bound_two_bodies(system: ArticulatedPlatform, legs: Sequence[int]) -> Bound | None:
     """Bézout for p in space and the slide's circle (degree 2): of a body's spheres all but one are planes by their
     differences, and those of the other body are linear in p then: 2 · 2 m, m the other body's conditions; without
     spheres 2 m. With a line for the slide one sphere of each body is left: 2 each."""
@@ -101,11 +101,11 @@ def _of_two_bodies(system: ArticulatedPlatform, legs: Sequence[int]) -> Bound | 
         return None
     if isinstance(system.slide, Line):
         return Bound(2 ** sum(round_), "a sphere of each body, planes besides (Bézout)", "product")
-    found = [(4 if round_[body] else 2) * counts[1 - body] for body in (0, 1) if round_[body] or not any(round_)]
-    return Bound(min(found), "the product of degrees in space and on the circle (Bézout)", "product")
+    bounds = [(4 if round_[body] else 2) * counts[1 - body] for body in (0, 1) if round_[body] or not any(round_)]
+    return Bound(min(bounds), "the product of degrees in space and on the circle (Bézout)", "product")
 
 
-def _of_a_body(system: Spatial, legs: Sequence[int]) -> Bound:
+def _bound_body(system: Spatial, legs: Sequence[int]) -> Bound:
     """The least of the bounds that hold for the six conditions of some legs."""
     curves = [system.curves[k] for k in legs]
     if sorted(system.forbids[k] for k in legs) == [1, 2, 3]:
@@ -115,12 +115,12 @@ def _of_a_body(system: Spatial, legs: Sequence[int]) -> Bound:
     if any(isinstance(curve, Point) for curve in curves) or all(isinstance(curve, Line | Plane) for curve in curves):
         # with planes p is a linear function of R
         return Bound(8, "three quadrics of the quaternion (Bézout)", "quadrics")
-    places = _places(system, legs) if all(isinstance(curve, Sphere) for curve in curves) else None
-    degree = degree_bound(system, legs)
+    places = _bound_places(system, legs) if all(isinstance(curve, Sphere) for curve in curves) else None
+    degree = compute_degree_bound(system, legs)
     return degree if places is None or degree.most < places.most else places
 
 
-def _places(system: Spatial, legs: Sequence[int]) -> Bound | None:
+def _bound_places(system: Spatial, legs: Sequence[int]) -> Bound | None:
     """Rods that share balls, one after another: three leave a ball two places, and so do two besides a ball whose
     distance is known; four between two and two balls leave these two shapes, which turn about both lines."""
     balls = [
@@ -132,7 +132,7 @@ def _places(system: Spatial, legs: Sequence[int]) -> Bound | None:
         three = next(([k for k in legs if side[k] == ball] for ball in shared if shared[ball] == 3), None)
         if three is None:
             continue
-        if any(len({other[k] for k in legs if k not in three}) == 2 for other in balls):
+        if any(len({ends[k] for k in legs if k not in three}) == 2 for ends in balls):
             return Bound(
                 8,
                 "two places of a ball with three rods, two of a ball with two more, two turns about their line",
@@ -162,22 +162,22 @@ def _places(system: Spatial, legs: Sequence[int]) -> Bound | None:
     return None
 
 
-def degree_bound(system: Spatial, legs: Sequence[int]) -> Bound:
+def compute_degree_bound(system: Spatial, legs: Sequence[int]) -> Bound:
     """40, or less by the double points that are proved to be isolated solutions, for all input in the balls."""
     from flint import ctx
 
     known = list[_Double]()
     with ctx.workprec(ROOT_ISOLATION_BITS_COUNT):
-        rows = list(_conditions(system, legs))
-        for a, b in _covers(rows):
-            known += [each for each in _doubles(rows, a, b) if all(each.is_distinct_from(other) for other in known)]
+        rows = list(_list_conditions(system, legs))
+        for a, b in _list_covers(rows):
+            known += [new for new in _prove_doubles(rows, a, b) if all(new.is_distinct_from(old) for old in known)]
     why = "six conditions on points of a rigid body (degree of the poses among 16 coordinates"
     if known:
         why += f", less 2 for each of {len(known)} isolated double points at infinity"
     return Bound(RIGID_BODY_VARIETY_DEGREE_COUNT - 2 * len(known), f"{why})", "degree")
 
 
-def _conditions(system: Spatial, legs: Sequence[int]) -> Iterator[_Condition]:
+def _list_conditions(system: Spatial, legs: Sequence[int]) -> Iterator[_Condition]:
     """The equations of some legs in working coordinates."""
     frame = system.frame
     numbers = system.balls(frame)
@@ -187,15 +187,15 @@ def _conditions(system: Spatial, legs: Sequence[int]) -> Iterator[_Condition]:
         centre = numbers.vector(frame.point(reach.centre)) / UNIT
         start = numbers.vector(frame.point(system.hub)) / UNIT if arrow else 0
         name = (b0, *system.tips[k].tolist())
-        for n in normals(reach) if isinstance(reach, Circle | Line | Plane) else ():
-            a = direction(n, frame, numbers) / UNIT
+        for n in list_normals(reach) if isinstance(reach, Circle | Line | Plane) else ():
+            a = convert_direction(n, frame, numbers) / UNIT
             yield _Condition(((0, *n.tolist()), name), 0, b0, a, b, 2 * (a @ (centre - start)))
         if isinstance(reach, Circle | Sphere):
             rho = numbers.vector(np.array([reach.radius / frame.size]))[0] / UNIT
             yield _Condition(((1, *reach.centre.tolist()), name), 1, b0, centre, b, rho * rho)
 
 
-def _covers(rows: Sequence[_Condition]) -> Iterator[tuple[_Pair, _Pair]]:
+def _list_covers(rows: Sequence[_Condition]) -> Iterator[tuple[_Pair, _Pair]]:
     """Two a's and two b's, not both of either at infinity, such that each condition has one of them, and all needed."""
     sides = [list(dict.fromkeys(row.names[side] for row in rows)) for side in (0, 1)]
     pairs = [[pair for pair in combinations(names, 2) if pair[0][0] or pair[1][0]] for names in sides]
@@ -225,7 +225,7 @@ class _Double:
             other.v @ (self.o - other.o),
             other.u @ (self.w - other.w),
         ]
-        return any(not each.contains(0) for each in tests)
+        return any(not test.contains(0) for test in tests)
 
     def is_isolated_solution(self, rows: Sequence[_Condition]) -> bool:
         """Return True if no other solution is near."""
@@ -246,7 +246,7 @@ class _Double:
                     acb(row.a0 * row.b0),
                 ]
             )
-        middles = np.array([[complex(each) for each in row] for row in table])
+        middles = np.array([[complex(entry) for entry in row] for row in table])
         k = int(np.argmax(np.abs(np.linalg.svd(middles)[2][-1])))
         try:
             rest = acb_mat([row[:k] + row[k + 1 :] for row in table]).solve(acb_mat([[-row[k]] for row in table]))
@@ -257,34 +257,34 @@ class _Double:
         return not (h * r - nu * nu).contains(0)
 
 
-def _doubles(rows: Sequence[_Condition], a: _Pair, b: _Pair) -> Iterator[_Double]:
+def _prove_doubles(rows: Sequence[_Condition], a: _Pair, b: _Pair) -> Iterator[_Double]:
     """The double points of two lines that are proved to be isolated solutions."""
     base, platform = (
         [next((row.a, row.b)[side] for row in rows if row.names[side] == name) for name in pair]
         for side, pair in enumerate((a, b))
     )
-    (o, n, first), (w, m, second) = _line(a, base), _line(b, platform)
-    for sign, other in product((1, -1), repeat=2):
+    (o, n, first), (w, m, second) = _build_line(a, base), _build_line(b, platform)
+    for sign, turn in product((1, -1), repeat=2):
         # v = e₁ + i e₂, n = e₁ × e₂, but u = f₁ − i f₂, m = f₁ × f₂: R is a turn from (f₁, f₂, m) to (e₁, e₂, n)
-        found = _Double(o, _isotropic(first, sign * n, 1), sign * n, w, _isotropic(second, other * m, -1), other * m)
-        if found.is_isolated_solution(rows):
-            yield found
+        new = _Double(o, _combine(first, sign * n, 1), sign * n, w, _combine(second, turn * m, -1), turn * m)
+        if new.is_isolated_solution(rows):
+            yield new
 
 
-def _line(names: _Pair, points: Sequence[Any]) -> tuple[Any, Any, Any]:
+def _build_line(names: _Pair, points: Sequence[Any]) -> tuple[Any, Any, Any]:
     """A point of the line through two, one of which may be a direction, its unit vector and one normal to that."""
-    one, other = points if names[0][0] else reversed(points)
-    along = other - one if names[0][0] and names[1][0] else other
+    start, end = points if names[0][0] else reversed(points)
+    along = end - start if names[0][0] and names[1][0] else end
     across = np.eye(3, dtype=int).astype(object)[int(np.argmin([abs(float(x)) for x in along]))]
-    return one, _unit(along), _unit(np.cross(along, across))
+    return start, _normalise(along), _normalise(np.cross(along, across))
 
 
-def _isotropic(first: Any, n: Any, sign: int) -> Any:
+def _combine(first: Any, n: Any, sign: int) -> Any:
     """first ± i n × first."""
     from flint import acb
 
     return np.array([acb(x, sign * y) for x, y in zip(first, np.cross(n, first), strict=True)], dtype=object)
 
 
-def _unit(v: Any) -> Any:
+def _normalise(v: Any) -> Any:
     return v / (v @ v).sqrt()

@@ -19,8 +19,17 @@ import numpy as np
 from ...geometry.loci import Circle, Curve
 from ...tolerances import RANK_GAP_MIN, SOLUTION_DISTANCE_MAX
 from ..krawczyk import Polynomial, enclose_zero
-from .polynomials import Eliminant, Equation, cycle, height, pair, primitive, univariate, without
-from .quadrics import UNIT, Balls, Conic, Within, WorkingFrame, parameter
+from .polynomials import (
+    Eliminant,
+    Equation,
+    compute_height,
+    divide_out,
+    eliminate_cycle,
+    make_primitive,
+    make_univariate,
+    pair,
+)
+from .quadrics import UNIT, Balls, Conic, Within, WorkingFrame, convert_parameter
 from .square_systems import SquareSystem
 
 if TYPE_CHECKING:
@@ -113,46 +122,46 @@ def solve_square(square: SquareSystem, balls: Within = Balls, farthest: float = 
         with ctx.workprec(ROOT_ISOLATION_BITS_COUNT):
             conics = square.conics(turn, balls)
             thick = square.build(conics, balls)
-        noisy = _perturb(equations, thick)
+        noisy = _change_coefficients(equations, thick)
         zeros = 0
-        for (order, eliminant), (_, other) in zip(_eliminants(equations), _eliminants(noisy), strict=True):
-            if _is_zero_to_rounding(eliminant.polynomial, other.polynomial):
+        for (order, eliminant), (_, second) in zip(_list_eliminants(equations), _list_eliminants(noisy), strict=True):
+            if _is_zero_to_rounding(eliminant.polynomial, second.polynomial):
                 zeros += 1
                 continue
-            found = _roots(_SquareEncloser(balls, equations, thick, square, turn, conics), order, eliminant, farthest)
-            if found.complete:
-                return replace(found, turn=turn)
-            fallback = max(fallback, found, key=lambda each: each.complex)
+            roots = _solve(_SquareEncloser(balls, equations, thick, square, turn, conics), order, eliminant, farthest)
+            if roots.complete:
+                return replace(roots, turn=turn)
+            fallback = max(fallback, roots, key=lambda roots: roots.complex)
         if zeros == max(1, len(square.unknowns)):
             return SolutionSet(complete=False, continuum=True)
     return fallback
 
 
-def _eliminants(equations: Sequence[Equation]) -> Iterator[tuple[tuple[int, ...], Eliminant]]:
+def _list_eliminants(equations: Sequence[Equation]) -> Iterator[tuple[tuple[int, ...], Eliminant]]:
     """The eliminants with each unknown kept in turn; the order of the unknowns, the kept one first."""
     tables = [equation.table for equation in equations]
     if len(tables) == 1:
-        yield (0,), univariate(tables[0][:, 0])
+        yield (0,), make_univariate(tables[0][:, 0])
     elif len(tables) == 2:
         f, g = tables
         yield (0, 1), pair(f, g)
         yield (1, 0), pair(f.T, g.T)
     else:
         f, g, h = tables
-        yield (0, 1, 2), cycle(f, g, h)
-        yield (1, 2, 0), cycle(g, h, f)
-        yield (2, 0, 1), cycle(h, f, g)
+        yield (0, 1, 2), eliminate_cycle(f, g, h)
+        yield (1, 2, 0), eliminate_cycle(g, h, f)
+        yield (2, 0, 1), eliminate_cycle(h, f, g)
 
 
-def _perturb(equations: Sequence[Equation], thick: Sequence[Equation]) -> list[Equation]:
+def _change_coefficients(equations: Sequence[Equation], thick: Sequence[Equation]) -> list[Equation]:
     """The equations with each coefficient changed at random by what the rounding of the input allows."""
     rng = random.Random(0)
-    found = []
+    changed = []
     for (table, i, j), (balls, _, _) in zip(equations, thick, strict=True):
         pairs = zip(table.flat, balls.flat, strict=True)
         changes = [c + int(_spread(ball) * rng.uniform(-1.0, 1.0)) for c, ball in pairs]
-        found.append(Equation(np.array(changes, dtype=object).reshape(table.shape), i, j))
-    return found
+        changed.append(Equation(np.array(changes, dtype=object).reshape(table.shape), i, j))
+    return changed
 
 
 def _spread(ball: Any) -> float:
@@ -162,35 +171,35 @@ def _spread(ball: Any) -> float:
 
 def _is_zero_to_rounding(polynomial: fmpz_poly, noisy: fmpz_poly) -> bool:
     """Return True if a resultant is zero, or of the size that rounding gives zero."""
-    return not polynomial or height(polynomial - noisy) * LOUD > height(polynomial)
+    return not polynomial or compute_height(polynomial - noisy) * LOUD > compute_height(polynomial)
 
 
-def _roots(square: _SquareEncloser, order: tuple[int, ...], eliminant: Eliminant, farthest: float) -> SolutionSet:
+def _solve(square: _SquareEncloser, order: tuple[int, ...], eliminant: Eliminant, farthest: float) -> SolutionSet:
     """The solutions over the roots of an eliminant."""
     from flint import ctx, fmpz_poly
 
     half_angles = square.part.round
     kept_round = half_angles[order[0]]
-    polynomial, extraneous = primitive(eliminant.polynomial), 0
+    polynomial, extraneous = make_primitive(eliminant.polynomial), 0
     at_infinity = kept_round and polynomial.degree() < eliminant.bound
     if kept_round:
-        polynomial, pairs = without(polynomial, fmpz_poly([1, 0, 1]))
+        polynomial, pairs = divide_out(polynomial, fmpz_poly([1, 0, 1]))
         extraneous = 2 * pairs
-    found = square.all_of(
-        all_solutions(polynomial, lambda x, m: _over(x, m, order, eliminant, half_angles)),
+    roots = square.all_of(
+        find_all_solutions(polynomial, lambda x, m: _solve_over(x, m, order, eliminant, half_angles)),
         polynomial.degree(),
         farthest,
     )
     with ctx.workprec(ROOT_ISOLATION_BITS_COUNT):
         surely = all(
             square.is_proved_complex(values)
-            for values in found.values
-            if DOUBLE_SOLUTION_DISTANCE_TOL / 2 <= off_real(values) < NEARLY_REAL_ROOT_TOL
+            for values in roots.values
+            if DOUBLE_SOLUTION_DISTANCE_TOL / 2 <= compute_off_real(values) < NEARLY_REAL_ROOT_TOL
         )
-    return replace(found, extraneous=extraneous, complete=found.complete and not at_infinity and surely)
+    return replace(roots, extraneous=extraneous, complete=roots.complete and not at_infinity and surely)
 
 
-def all_solutions(polynomial: fmpz_poly, over: Callable[[Any, int], list[Solution]]) -> list[Solution]:
+def find_all_solutions(polynomial: fmpz_poly, over: Callable[[Any, int], list[Solution]]) -> list[Solution]:
     """The solutions ``over`` each complex root and its multiplicity, as precise as it takes to have them all."""
     from flint import ctx
 
@@ -198,28 +207,28 @@ def all_solutions(polynomial: fmpz_poly, over: Callable[[Any, int], list[Solutio
     precision = ROOT_ISOLATION_BITS_COUNT
     for _ in range(PRECISION_DOUBLINGS_MAX):
         with ctx.workprec(precision):
-            resolved = [each for x, m in _isolate(polynomial) for each in over(x, m)]
+            resolved = [solution for x, m in _find_roots(polynomial) for solution in over(x, m)]
             if sum(m for _, m in resolved) == polynomial.degree():
                 break
         precision *= 2
     return resolved
 
 
-def _over(
+def _solve_over(
     x: Any, multiplicity: int, order: tuple[int, ...], eliminant: Eliminant, half_angles: Sequence[bool]
 ) -> list[Solution]:
     """Return the solutions over a root, each with its multiplicity; none if they cannot be separated from infinity or
     from each other."""
-    one = _restore_order(order, (x, *eliminant.others(x)))
-    if _has_finite_values(one, half_angles):
-        return [(one, multiplicity)]
-    found = [_restore_order(order, (x, *others)) for others in eliminant.several(x) or ()]
-    if len(found) != multiplicity or not all(_has_finite_values(values, half_angles) for values in found):
+    single = _restore_order(order, (x, *eliminant.others(x)))
+    if _has_finite_values(single, half_angles):
+        return [(single, multiplicity)]
+    several = [_restore_order(order, (x, *others)) for others in eliminant.several(x) or ()]
+    if len(several) != multiplicity or not all(_has_finite_values(values, half_angles) for values in several):
         return []
-    return [(values, 1) for values in found]
+    return [(values, 1) for values in several]
 
 
-def _isolate(polynomial: fmpz_poly) -> list[tuple[Any, int]]:
+def _find_roots(polynomial: fmpz_poly) -> list[tuple[Any, int]]:
     """Balls about the roots of an integer polynomial, each with one root alone, and multiplicities."""
     roots: Any = polynomial.complex_roots() if polynomial.degree() > 0 else []
     return [(x, int(m)) for x, m in roots]
@@ -227,10 +236,10 @@ def _isolate(polynomial: fmpz_poly) -> list[tuple[Any, int]]:
 
 def _restore_order(order: tuple[int, ...], values: Sequence[Any]) -> list[Any]:
     """Values in the order of the unknowns."""
-    found: list[Any] = [None] * len(order)
+    restored: list[Any] = [None] * len(order)
     for place, value in zip(order, values, strict=True):
-        found[place] = value
-    return found
+        restored[place] = value
+    return restored
 
 
 def _has_finite_values(values: Sequence[Any], half_angles: Sequence[bool]) -> bool:
@@ -252,7 +261,7 @@ def is_real(values: Sequence[Any]) -> bool:
     return all(v.imag.is_zero() for v in values)
 
 
-def off_real(values: Sequence[Any]) -> float:
+def compute_off_real(values: Sequence[Any]) -> float:
     """Return the distance of a solution from real ones, relative to its unknowns."""
     return max(abs(float(v.imag)) / (1.0 + abs(float(v.real))) for v in values)
 
@@ -260,7 +269,7 @@ def off_real(values: Sequence[Any]) -> float:
 def _is_almost_real(values: Sequence[Any]) -> bool:
     """Return True if a solution is the first of a conjugate pair that nearly is one real solution."""
     first = next((float(v.imag) for v in values if not v.imag.is_zero()), 0.0)
-    return off_real(values) < DOUBLE_SOLUTION_DISTANCE_TOL / 2 and first > 0
+    return compute_off_real(values) < DOUBLE_SOLUTION_DISTANCE_TOL / 2 and first > 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -290,7 +299,7 @@ class SolutionEncloser(ABC):
         root of ``degree`` has its solution and each real one is enclosed or multiple."""
         from flint import ctx
 
-        resolved, far, undecided = _nearer(solutions, self.distance, farthest)
+        resolved, far, undecided = _select_nearer(solutions, self.distance, farthest)
         with ctx.workprec(ROOT_ISOLATION_BITS_COUNT):
             real = tuple(self._enclose([v.real for v in values], m) for values, m in resolved if is_real(values))
             real += tuple(self._middle(values) for values, _ in resolved if _is_almost_real(values))
@@ -303,7 +312,7 @@ class SolutionEncloser(ABC):
             real,
             degree - far,
             complete=count == degree - far and proved and not undecided,
-            closest=_closest(values),
+            closest=_measure_closest(values),
             method=self.method,
             far=far,
             undecided=undecided,
@@ -313,19 +322,19 @@ class SolutionEncloser(ABC):
 
     def _enclose(self, start: Sequence[Any], multiplicity: int) -> RealSolution:
         """The box of a real solution: for the exact input where that can be proved, else for the rounded one."""
-        for each in (self.thick, self.equations):
-            box = enclose_zero(each, start)
+        for equations in (self.thick, self.equations):
+            box = enclose_zero(equations, start)
             if box is not None:
-                own = self.parameters(box)
-                return RealSolution(own, self.misses(own, box), 1, True, each is self.thick)
-        own = self.parameters(start)
-        return RealSolution(own, self.misses(own, start), multiplicity, False, False)
+                parameters = self.parameters(box)
+                return RealSolution(parameters, self.misses(parameters, box), 1, True, equations is self.thick)
+        parameters = self.parameters(start)
+        return RealSolution(parameters, self.misses(parameters, start), multiplicity, False, False)
 
     def _middle(self, values: Sequence[Any]) -> RealSolution:
         """The real part of a conjugate pair, and how far its points are from there at most."""
-        own = self.parameters([v.real.mid() for v in values])
+        parameters = self.parameters([v.real.mid() for v in values])
         wide = [v.real + v.imag.union(-v.imag) for v in values]
-        return RealSolution(own, self.misses(own, wide), 2, False, False, False)
+        return RealSolution(parameters, self.misses(parameters, wide), 2, False, False, False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -355,37 +364,37 @@ class _SquareEncloser(SolutionEncloser):
         (m)."""
         return [
             [
-                math.hypot(*(float(each.rad()) for each in row if not isinstance(each, int))) * self.frame.size / UNIT
+                math.hypot(*(float(ball.rad()) for ball in row if not isinstance(ball, int))) * self.frame.size / UNIT
                 for row in path.N
             ]
             for path in self.conics
         ]
 
     def distance(self, values: Sequence[Any]) -> float:
-        found = []
+        distances = []
         for curve, t in zip(self.part.unknowns, values, strict=True):
             z = complex(t)
-            found.append(abs(z) if not isinstance(curve, Circle) else max(1.0, abs(z)) ** 2 / abs(1.0 + z * z))
-        return max(found)
+            distances.append(abs(z) if not isinstance(curve, Circle) else max(1.0, abs(z)) ** 2 / abs(1.0 + z * z))
+        return max(distances)
 
     def parameters(self, values: Sequence[Any]) -> tuple[Any, ...]:
         return tuple(
-            parameter(curve, self.frame, origin, t)
+            convert_parameter(curve, self.frame, origin, t)
             for curve, origin, t in zip(self.part.unknowns, self.part.turns(self.turn), values, strict=True)
         )
 
     def misses(self, own: Sequence[Any], values: Sequence[Any]) -> tuple[float, ...]:
         if self.part.exact is not None:
             return tuple(
-                self._miss(*each)
-                for each in zip(self.part.unknowns, own, values, self.part.exact(self.balls), strict=True)
+                self._miss(*item)
+                for item in zip(self.part.unknowns, own, values, self.part.exact(self.balls), strict=True)
             )
-        found = []
+        misses = []
         for curve, s, t, (r0, r1, r2) in zip(self.part.unknowns, own, values, self._radii, strict=True):
             ball, size = float(s.rad()), abs(float(t.mid())) + float(t.rad())
             moved, w = (ball * curve.radius, 1.0 + size * size) if isinstance(curve, Circle) else (ball, 1.0)
-            found.append(moved + (r0 + size * (r1 + size * r2)) / w)
-        return tuple(found)
+            misses.append(moved + (r0 + size * (r1 + size * r2)) / w)
+        return tuple(misses)
 
     def _miss(self, curve: Curve, s: Any, t: Any, path: Conic) -> float:
         """As above, for a point that is none of the curve's own."""
@@ -396,7 +405,7 @@ class _SquareEncloser(SolutionEncloser):
         )
 
 
-def _nearer(
+def _select_nearer(
     solutions: Sequence[Solution], distance: Callable[[Sequence[Any]], float], farthest: float
 ) -> tuple[list[Solution], int, bool]:
     """The solutions within a distance (sizes), which are not at infinity but for rounding, how many are beyond, and
@@ -405,16 +414,16 @@ def _nearer(
         return list(solutions), 0, False
     placed = [(distance(values), (values, m)) for values, m in solutions]
     beyond = [(size, m) for size, (_, m) in placed if size > farthest]
-    near = [(size, each) for size, each in placed if size <= farthest]
+    near = [(size, solution) for size, solution in placed if size <= farthest]
     nearest_beyond = min((size for size, _ in beyond), default=np.inf)
     if max((size for size, _ in near), default=0.0) * RANK_GAP_MIN > nearest_beyond:
         return list(solutions), 0, True
-    return [each for _, each in near], sum(m for _, m in beyond), False
+    return [solution for _, solution in near], sum(m for _, m in beyond), False
 
 
-def _closest(solutions: Sequence[Sequence[Any]]) -> float:
+def _measure_closest(solutions: Sequence[Sequence[Any]]) -> float:
     """The smallest distance between two solutions, each unknown relative to its size."""
-    values = np.array([[complex(v) for v in each] for each in solutions])
+    values = np.array([[complex(v) for v in solution] for solution in solutions])
     if len(values) < 2:
         return np.inf
     apart = np.abs(values[:, None] - values[None]) / (1.0 + np.abs(values))[None]

@@ -19,21 +19,21 @@ from ...tolerances import (
     TIP_ROUNDING,
 )
 from .constrained_platform import System
-from .modular_root_bound import most_zeros
+from .modular_root_bound import bound_zeros
 from .overdetermined import (
     SnappedPoints,
-    dimension,
+    compute_residual,
+    describe_fits,
+    find_dimension,
+    find_stationary,
     is_beyond_rigid_platform,
     is_excluded,
     may_be_goal,
-    residual,
     snap_centres,
-    stationary,
-    words,
 )
-from .pose_coordinate_solver import ProposedSolutions, by_msolve, enclose_roots, propose_roots, wholes
+from .pose_coordinate_solver import ProposedSolutions, enclose_roots, list_parts, propose_by_msolve, propose_roots
 from .quadrics import PoseSystem
-from .root_bound import Bound, least_bound
+from .root_bound import Bound, find_least_bound
 from .roots import DOUBLE_SOLUTION_DISTANCE_TOL, RealSolution, SolutionSet, has_nearly_double_solution, solve_square
 from .square_systems import SquareSystem
 from .translating import TranslatingPlatform
@@ -141,30 +141,30 @@ def solve(system: System, *, near: bool = True, goal: Array | None = None) -> Sy
     surfaces are left to a solver that proposes poses: a homotopy for a rigid body, else msolve (``MissingExtra`` where
     that is not installed).
     """
-    system, told = snap_centres(system)
-    return replace(_solve(system, near, goal), snapped=told)
+    system, snapped = snap_centres(system)
+    return replace(_solve(system, near, goal), snapped=snapped)
 
 
 def _solve(system: System, near: bool, goal: Array | None) -> SystemModes:
     if system.missing:
-        return _too_few(system)
+        return _report_too_few(system)
     square = None
     for square in system.squares():
         roots = solve_square(square, system.balls(square.frame), system.farthest)
         if not roots.continuum:
             if not near:
                 return _judge(system, square, roots, None, goal)
-            others = (each for each in system.squares() if each.legs != square.legs)
+            others = (part for part in system.squares() if part.legs != square.legs)
             return _judge(
                 system,
                 square,
                 roots,
-                ((each, solve_square(each)) for each in islice(others, LEG_CHOICES_SOLVED_MAX)),
+                ((part, solve_square(part)) for part in islice(others, LEG_CHOICES_SOLVED_MAX)),
                 goal,
             )
     if system.has_surface_loci and not isinstance(system, TranslatingPlatform):
         return _propose(system, near, goal, propose_roots)
-    return _undecided_modes(system, square is not None, goal, near)
+    return _report_undecided(system, square is not None, goal, near)
 
 
 def solve_by_msolve(system: System, *, near: bool = True, goal: Array | None = None) -> SystemModes:
@@ -173,8 +173,8 @@ def solve_by_msolve(system: System, *, near: bool = True, goal: Array | None = N
     As :func:`solve`, but solutions that coincide are counted once, and near modes are looked for from the solutions of
     one choice of legs alone. Raises ``MissingExtra``, ``ExternalSolverFailure``.
     """
-    system, told = snap_centres(system)
-    return replace(_propose(system, near, goal, lambda part, enough: by_msolve(part)), snapped=told)
+    system, snapped = snap_centres(system)
+    return replace(_propose(system, near, goal, lambda part, enough: propose_by_msolve(part)), snapped=snapped)
 
 
 def _propose(
@@ -184,35 +184,35 @@ def _propose(
     proposer: Callable[[PoseSystem, int | None], ProposedSolutions | None],
 ) -> SystemModes:
     if system.missing:
-        return _too_few(system)
+        return _report_too_few(system)
     part = None
-    for part in islice(wholes(system), LEG_CHOICES_SOLVED_MAX):
-        most = least_bound(system, part.legs)
+    for part in islice(list_parts(system), LEG_CHOICES_SOLVED_MAX):
+        most = find_least_bound(system, part.legs)
         roots = None
         for number in range(POSE_CHARTS_TRIED_MAX):
             part = replace(part, chart=system.chart(number)) if number else part
-            found = proposer(part, None if most is None else most.most)
-            if found is None:
+            proposed = proposer(part, None if most is None else most.most)
+            if proposed is None:
                 break
-            roots = enclose_roots(part, found, most, system.balls(part.chart.frame), system.farthest)
-            if found.loose and roots.complex != (most and most.most) and dimension(system):
+            roots = enclose_roots(part, proposed, most, system.balls(part.chart.frame), system.farthest)
+            if proposed.loose and roots.complex != (most and most.most) and find_dimension(system):
                 roots = None
                 break
             if roots.apart or not roots.complete or part.chart.study is None:
                 break
         if roots is not None:
             return _judge(system, part, roots, () if near else None, goal, most)
-    return _undecided_modes(system, part is not None, goal, near)
+    return _report_undecided(system, part is not None, goal, near)
 
 
-def _too_few(system: System) -> SystemModes:
-    return continuum(f"too few legs: a continuous family of dimension {system.missing}", system.missing)
+def _report_too_few(system: System) -> SystemModes:
+    return make_family(f"too few legs: a continuous family of dimension {system.missing}", system.missing)
 
 
-def _undecided_modes(system: System, tried: bool, goal: Array | None, near: bool) -> SystemModes:
+def _report_undecided(system: System, tried: bool, goal: Array | None, near: bool) -> SystemModes:
     """Return the result if no choice of legs has finitely many solutions: the goal, if it is given, is one. Poses of a
     continuous family are sought if ``near`` ones are."""
-    known = () if goal is None else (_by_construction(system, goal, ()),)
+    known = () if goal is None else (_make_goal_mode(system, goal, ()),)
     if not tried:
         return SystemModes(
             len(known),
@@ -231,7 +231,7 @@ def _undecided_modes(system: System, tried: bool, goal: Array | None, near: bool
             singular_solutions="the equations depend on each other",
             open=True,
         )
-    size = dimension(system)
+    size = find_dimension(system)
     if not size:
         return SystemModes(
             len(known),
@@ -241,10 +241,10 @@ def _undecided_modes(system: System, tried: bool, goal: Array | None, near: bool
             singular_solutions="the equations depend on each other, but no continuous family of poses was found",
             open=True,
         )
-    return replace(continuum(f"the tips can move together: a continuous family of dimension {size}", size), open=True)
+    return replace(make_family(f"the tips can move together: a continuous family of dimension {size}", size), open=True)
 
 
-def continuum(text: str, size: int) -> SystemModes:
+def make_family(text: str, size: int) -> SystemModes:
     """Return modes that form a continuous family of this dimension."""
     return SystemModes(
         0, (), False, "a continuous family is not counted", singular_solutions=text, continuous_family=size
@@ -261,30 +261,30 @@ def _judge(
 ) -> SystemModes:
     """The modes among the solutions of a square part, ``most`` at most; near ones are looked for from those of others
     too (not at all where these are None)."""
-    found = [_mode(system, square, root) for root in roots.real]
-    enclosed = roots.complete and all(mode.proved for mode in found)
+    listed = [_make_mode(system, square, root) for root in roots.real]
+    enclosed = roots.complete and all(mode.proved for mode in listed)
     bound, proof = (
-        ("resultant", _proof(system, roots))
+        ("resultant", _describe_proof(system, roots))
         if isinstance(square, SquareSystem)
         else _bound(system, square, most, roots)
     )
     if square.whole:
         return SystemModes(
             roots.complex,
-            tuple(found),
+            tuple(listed),
             enclosed and bound != "none",
             proof,
             (),
-            _special(roots),
+            _describe_special(roots),
             None,
             bound,
             enclosed,
-            solved=(SquareSolution(system, square, roots, tuple(found), (True,) * len(found)),),
+            solved=(SquareSolution(system, square, roots, tuple(listed), (True,) * len(listed)),),
         )
     whole = [
-        mode for mode, root in zip(found, roots.real, strict=True) if not _is_beyond_platform(system, square, root)
+        mode for mode, root in zip(listed, roots.real, strict=True) if not _is_beyond_platform(system, square, root)
     ]
-    at_goal = _goal(system, roots, whole, goal)
+    at_goal = _find_goal(system, roots, whole, goal)
     left = [
         mode
         for mode in whole
@@ -299,30 +299,30 @@ def _judge(
     open_ = [mode for mode in left if mode is not at_goal and mode.residual > LOCUS_DISTANCE_TOL]
     lost = goal is not None and not any(_is_goal_pose(system, mode.q, goal) for mode in left)
     if goal is not None and not any(_is_goal_pose(system, mode.q, goal) for mode in modes):
-        at_goal = _by_construction(system, goal, square.legs)  # its solution is known too roughly to match
+        at_goal = _make_goal_mode(system, goal, square.legs)  # its solution is known too roughly to match
         modes, open_ = (*modes, at_goal), [mode for mode in open_ if not _is_goal_pose(system, mode.q, goal)]
         enclosed = False
-    near = () if others is None else _near(system, found, modes, others)
+    near = () if others is None else _find_near(system, listed, modes, others)
     fitting = [mode.residual for mode in modes if mode is not at_goal]
-    proof = f"from {len(square.legs)} of {len(system.curves)} tips: {proof}; of these " + words(
-        at_goal is not None, lost, fitting, len(found) - len(left), len(open_)
+    proof = f"from {len(square.legs)} of {len(system.curves)} tips: {proof}; of these " + describe_fits(
+        at_goal is not None, lost, fitting, len(listed) - len(left), len(open_)
     )
-    kept = tuple(mode in left and mode not in open_ for mode in found)
+    kept = tuple(mode in left and mode not in open_ for mode in listed)
     return SystemModes(
         len(modes),
         modes,
         enclosed and bound != "none",
         proof,
         near,
-        _special(roots),
+        _describe_special(roots),
         None,
         bound,
         enclosed,
-        solved=(SquareSolution(system, square, roots, tuple(found), kept),),
+        solved=(SquareSolution(system, square, roots, tuple(listed), kept),),
     )
 
 
-def _by_construction(system: System, goal: Array, legs: tuple[int, ...]) -> SystemMode:
+def _make_goal_mode(system: System, goal: Array, legs: tuple[int, ...]) -> SystemMode:
     """The goal as a mode whose place no solution proves."""
     return SystemMode(
         (),
@@ -336,11 +336,13 @@ def _by_construction(system: System, goal: Array, legs: tuple[int, ...]) -> Syst
     )
 
 
-def _goal(system: System, roots: SolutionSet, found: Sequence[SystemMode], goal: Array | None) -> SystemMode | None:
+def _find_goal(
+    system: System, roots: SolutionSet, listed: Sequence[SystemMode], goal: Array | None
+) -> SystemMode | None:
     """The solution that is the goal: the only one that can be, where all are known."""
     if goal is None or not roots.complete:
         return None
-    able = [mode for mode in found if not mode.proved or may_be_goal(system, mode.q, goal, mode.shift, mode.turn)]
+    able = [mode for mode in listed if not mode.proved or may_be_goal(system, mode.q, goal, mode.shift, mode.turn)]
     return able[0] if len(able) == 1 and able[0].proved else None
 
 
@@ -351,7 +353,7 @@ def _is_goal_pose(system: System, q: Array, goal: Array) -> bool:
 
 def _bound(system: System, part: PoseSystem, most: Bound | None, roots: SolutionSet) -> tuple[str, str]:
     """Return the root bound beyond the solutions that a solver proposes, and the proof as text (proofs.md 8)."""
-    proof = _proof(system, roots)
+    proof = _describe_proof(system, roots)
     known = f", {roots.beyond} enclosed at infinity" if roots.beyond else ""
     known += f", the {roots.far} far ones for the rounded geometry" if roots.far else ""
     count = roots.complex + roots.beyond + roots.far
@@ -360,7 +362,7 @@ def _bound(system: System, part: PoseSystem, most: Bound | None, roots: Solution
             f"{proof}; the complex ones are enclosed too, all distinct{known}, and there are at "
             f"most {most.most}: {most.why}"
         )
-    if roots.apart and part.chart.study is None and most_zeros(part.equations(), count) == count:
+    if roots.apart and part.chart.study is None and bound_zeros(part.equations(), count) == count:
         return "rank", (
             f"{proof}; the complex ones are enclosed too, all distinct{known}, and there are no "
             "more: ranks of multiples of the equations modulo a prime of 62 bits"
@@ -369,29 +371,32 @@ def _bound(system: System, part: PoseSystem, most: Bound | None, roots: Solution
     return "none", f"{proof}; that is what the solver found{limit}"
 
 
-def _near(
-    system: System, found: Sequence[SystemMode], modes: Sequence[SystemMode], others: Iterable[tuple[Part, SolutionSet]]
+def _find_near(
+    system: System,
+    listed: Sequence[SystemMode],
+    modes: Sequence[SystemMode],
+    others: Iterable[tuple[Part, SolutionSet]],
 ) -> tuple[SystemMode, ...]:
     """Near modes, from all solutions of one square part and of others."""
-    starts = [mode.q for mode in found]
-    for other, found_there in others:
-        starts += [_mode(system, other, root).q for root in found_there.real]
-    return tuple(_nearly(system, q) for q in stationary(system, starts, [mode.q for mode in modes]))
+    starts = [mode.q for mode in listed]
+    for part, found_there in others:
+        starts += [_make_mode(system, part, root).q for root in found_there.real]
+    return tuple(_make_near_mode(system, q) for q in find_stationary(system, starts, [mode.q for mode in modes]))
 
 
-def _mode(system: System, square: Part, root: RealSolution) -> SystemMode:
-    parameters = tuple(float(each.mid()) for each in root.parameters)
+def _make_mode(system: System, square: Part, root: RealSolution) -> SystemMode:
+    parameters = tuple(float(ball.mid()) for ball in root.parameters)
     q = square.place(parameters)
     at = system.tips_at(q)
     if isinstance(square, SquareSystem):
-        own = parameters
-        apart = system.apart(q, at, square.legs, _points(square, root))
+        on_curves = parameters
+        apart = system.apart(q, at, square.legs, _list_points(square, root))
     else:
-        own, apart = (), {k: miss + TIP_ROUNDING * system.size for k, miss in enumerate(root.misses)}
+        on_curves, apart = (), {k: miss + TIP_ROUNDING * system.size for k, miss in enumerate(root.misses)}
     shift, turn = system.spread(q, apart)
     sure = _is_proved_for_input(system, root) and bool(np.isfinite(shift))
     return SystemMode(
-        own,
+        on_curves,
         max(shift / system.size, turn),
         shift,
         turn,
@@ -405,7 +410,7 @@ def _mode(system: System, square: Part, root: RealSolution) -> SystemMode:
     )
 
 
-def _points(square: SquareSystem, root: RealSolution) -> list[tuple[Array, float]]:
+def _list_points(square: SquareSystem, root: RealSolution) -> list[tuple[Array, float]]:
     """The points of a square's curves at a solution, and how far the exact ones can be from them (m)."""
     points = [curve.at(float(s.mid())) for curve, s in zip(square.unknowns, root.parameters, strict=True)]
     return list(zip(points, root.misses, strict=True))
@@ -419,7 +424,7 @@ def _is_beyond_platform(system: System, square: Part, root: RealSolution) -> boo
         and system.rigid
         and _is_proved_for_input(system, root)
         and any(isinstance(system.curves[k], Point) for k in square.legs)
-        and is_beyond_rigid_platform(system, system.known_tips(square.legs, _points(square, root)))
+        and is_beyond_rigid_platform(system, system.known_tips(square.legs, _list_points(square, root)))
     )
 
 
@@ -428,13 +433,13 @@ def _is_proved_for_input(system: System, root: RealSolution) -> bool:
     return bool(np.isfinite(system.error) and root.unique and root.thick)
 
 
-def _nearly(system: System, q: Array) -> SystemMode:
+def _make_near_mode(system: System, q: Array) -> SystemMode:
     return SystemMode(
-        (), np.inf, np.inf, np.pi, residual(system, q), freeze_array(system.pose(q)), freeze_array(q), near=True
+        (), np.inf, np.inf, np.pi, compute_residual(system, q), freeze_array(system.pose(q)), freeze_array(q), near=True
     )
 
 
-def _proof(system: System, roots: SolutionSet) -> str:
+def _describe_proof(system: System, roots: SolutionSet) -> str:
     if not roots.degree and roots.complex:
         return "fixed tips, which leave one pose"
     text = f"{roots.method} of degree {roots.degree}"
@@ -460,7 +465,7 @@ def _proof(system: System, roots: SolutionSet) -> str:
     return text
 
 
-def _special(roots: SolutionSet) -> str | None:
+def _describe_special(roots: SolutionSet) -> str | None:
     if roots.undecided:
         return (
             "the solutions of all distances are counted: undecided which of them a snapped geometry sends to infinity"

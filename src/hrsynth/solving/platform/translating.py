@@ -22,18 +22,18 @@ from .quadrics import (
     MovingPoint,
     Numbers,
     PoseParametrization,
-    direction,
-    normals,
-    on_circle,
-    on_plane,
-    on_sphere,
-    shifting,
-    spatial_frame,
-    spokes,
+    build_shifting,
+    build_spokes,
+    choose_frame,
+    convert_direction,
+    list_normals,
+    put_on_circle,
+    put_on_plane,
+    put_on_sphere,
     sum_on_plane,
     sum_on_sphere,
 )
-from .square_systems import SquareSystem, resting, single, three_surfaces
+from .square_systems import SquareSystem, build_three_surfaces, make_fixed_square, make_single
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -64,10 +64,10 @@ class TranslatingPlatform(TranslatingBodies):
 
     def chart(self, number: int) -> PoseParametrization:
         """The position."""
-        frame = spatial_frame(self.paths, self.size)
+        frame = choose_frame(self.paths, self.size)
 
         def tips(numbers: Numbers) -> list[MovingPoint]:
-            return [shifting(3, numbers.vector(np.zeros(3)))] * len(self.paths)
+            return [build_shifting(3, numbers.vector(np.zeros(3)))] * len(self.paths)
 
         return PoseParametrization(
             frame, 3, self.paths, tips, (), lambda x: frame.origin + frame.size * (np.array(x) @ frame.R)
@@ -80,7 +80,7 @@ class TranslatingPlatform(TranslatingBodies):
         surfaces = {k: path for k, path in enumerate(self.paths) if isinstance(path, Surface)}
         for k, path in curves.items():
             if isinstance(path, Point):
-                yield resting((k,), path.centre, len(self.paths) == 1)
+                yield make_fixed_square((k,), path.centre, len(self.paths) == 1)
         moving = [k for k, path in curves.items() if not isinstance(path, Point)]
         pairs = sorted(
             combinations(moving, 2), key=lambda two: not is_coplanar(curves[two[0]], curves[two[1]], self.size)
@@ -95,28 +95,28 @@ class TranslatingPlatform(TranslatingBodies):
             for j, surface in surfaces.items():
                 yield self._on_curve((i, j), curves[i], surface, len(self.curves) == 2)
         triples = [
-            three_surfaces([(k, surfaces[k]) for k in legs], len(self.curves) == 3)
+            build_three_surfaces([(k, surfaces[k]) for k in legs], len(self.curves) == 3)
             for legs in combinations(surfaces, 3)
         ]
-        yield from (square for _, square in sorted(triples, key=lambda each: -each[0]))
+        yield from (square for _, square in sorted(triples, key=lambda triple: -triple[0]))
 
     def _on_curve(self, legs: tuple[int, int], one: Curve, other: Reach, whole: bool) -> SquareSystem:
         """The curve's points at which the other is met."""
         both = (one, other)
-        frame = spatial_frame(both, extent(both, np.zeros((1, 3))))
+        frame = choose_frame(both, extent(both, np.zeros((1, 3))))
 
         def build(conics: Sequence[Conic], numbers: Numbers) -> list[Equation]:
             centre = numbers.vector(frame.point(other.centre))
             if isinstance(other, Sphere) or (isinstance(other, Circle) and is_coplanar(one, other, self.size)):
                 rho = numbers.vector(np.array([other.radius / frame.size]))[0]
-                return [single(on_sphere(conics[0], centre, rho * rho))]
-            normal = direction(met_normal(one, other), frame, numbers)
-            return [single(on_plane(conics[0], normal, normal @ centre))]
+                return [make_single(put_on_sphere(conics[0], centre, rho * rho))]
+            normal = convert_direction(find_met_normal(one, other), frame, numbers)
+            return [make_single(put_on_plane(conics[0], normal, normal @ centre))]
 
         return SquareSystem(legs, (one,), frame, build, lambda parameters: one.at(parameters[0]), whole)
 
 
-def met_normal(one: Curve, other: Reach) -> Array:
+def find_met_normal(one: Curve, other: Reach) -> Array:
     """The normal of the plane of ``other`` that ``one`` is met with."""
     if isinstance(other, Circle | Plane):
         return other.axis if isinstance(other, Circle) else other.normal
@@ -186,37 +186,39 @@ class ArticulatedPlatform(TranslatingBodies):
 
     def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:
         """Return how far the bodies can be from their places at q (m); they do not rotate."""
-        sides = [[each for k, each in apart.items() if self.bodies[k] == body] for body in (0, 1)]
+        sides = [[distance for k, distance in apart.items() if self.bodies[k] == body] for body in (0, 1)]
         return max(min(side, default=math.inf) for side in sides), 0.0
 
     def chart(self, number: int) -> PoseParametrization:
         """p, cos θ and sin θ, or s."""
-        middle = spatial_frame(self.paths, self.size).origin
-        frame = replace(spatial_frame((*self.paths, self.slide), self.size), origin=middle)
+        middle = choose_frame(self.paths, self.size).origin
+        frame = replace(choose_frame((*self.paths, self.slide), self.size), origin=middle)
 
         count = 5 if isinstance(self.slide, Circle) else 4
 
         def tips(numbers: Numbers) -> list[MovingPoint]:
             centre = numbers.vector(frame.vector(self.slide.centre))
             along = (
-                spokes(self.slide, frame, 0.0, numbers)
+                build_spokes(self.slide, frame, 0.0, numbers)
                 if isinstance(self.slide, Circle)
-                else [direction(self.slide.direction, frame, numbers)]
+                else [convert_direction(self.slide.direction, frame, numbers)]
             )
-            both = shifting(count, centre * 0), shifting(count, centre, tuple(enumerate(along, 4)))
+            both = build_shifting(count, centre * 0), build_shifting(count, centre, tuple(enumerate(along, 4)))
             return [both[body] for body in self.bodies]
 
         def place(x: Sequence[float]) -> Array:
             along = math.atan2(x[4], x[3]) if count == 5 else frame.size * x[3]
             return np.array([*(frame.origin + frame.size * (np.array(x[:3]) @ frame.R)), along])
 
-        return PoseParametrization(frame, count, self.paths, tips, (on_circle(5, 4, 5),) if count == 5 else (), place)
+        return PoseParametrization(
+            frame, count, self.paths, tips, (put_on_circle(5, 4, 5),) if count == 5 else (), place
+        )
 
     def squares(self) -> Iterator[SquareSystem]:
         """The pairs of legs, one on each body, each in both roles; first those where no plane is the slide's own."""
         curves = [(k, path) for k, path in enumerate(self.paths) if not isinstance(path, Surface)]
-        one, two = ([each for each in curves if self.bodies[each[0]] == body] for body in (0, 1))
-        roles = [roles for i in one for j in two for roles in ((i, j), (j, i))]
+        firsts, seconds = ([curve for curve in curves if self.bodies[curve[0]] == body] for body in (0, 1))
+        roles = [roles for i in firsts for j in seconds for roles in ((i, j), (j, i))]
         for first, onto in sorted(roles, key=lambda roles: self._is_parallel_to_slider(roles[1][1])):
             if not isinstance(onto[1], Point):
                 yield self._square((first[0], onto[0]), first[1], onto[1])
@@ -235,16 +237,16 @@ class ArticulatedPlatform(TranslatingBodies):
         size = max(extent((first, onto), np.zeros((1, 3))), self._radius, length(self.slide.centre))
         middle = (first.centre + onto.centre) / 2
         start, end = shift_reach(first, -middle), shift_reach(onto, -middle)
-        frame = replace(spatial_frame((start, end, self.slide), size), origin=np.zeros(3))
+        frame = replace(choose_frame((start, end, self.slide), size), origin=np.zeros(3))
         resting = isinstance(first, Point)
 
         def build(conics: Sequence[Conic], numbers: Numbers) -> list[Equation]:
             centre = numbers.vector(frame.point(end.centre))
-            across = [direction(n, frame, numbers) for n in normals(onto)]
+            across = [convert_direction(n, frame, numbers) for n in list_normals(onto)]
             if resting:
                 left = centre - numbers.vector(frame.point(start.centre))
-                quadratics = [on_plane(conics[0], sign * n, n @ left) for n in across]
-                return [single(quadratics[0])]
+                quadratics = [put_on_plane(conics[0], sign * n, n @ left) for n in across]
+                return [make_single(quadratics[0])]
             tables = [sum_on_plane(conics[0], conics[1], sign, n, n @ centre) for n in across]
             if isinstance(onto, Circle):
                 rho = numbers.vector(np.array([onto.radius / frame.size]))[0]

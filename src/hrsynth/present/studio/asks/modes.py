@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ....analysis.modes.assembly_mode import AssemblyMode
-from ....analysis.modes.modes import AssemblyModes, at_mode, modes
+from ....analysis.modes.modes import AssemblyModes, assemble_at_mode, modes
 from ....analysis.modes.near_modes import NearMode
 from ....errors import PoseReachFailure
 from ....kinematics.configuration import ClosedConfiguration
@@ -43,7 +43,7 @@ def describe_modes(found: AssemblyModes) -> str:
 
 def _describe_mode(request: Request, found: AssemblyModes, number: int, mode: AssemblyMode) -> dict[str, Any]:
     try:
-        there = at_mode(found, ModeNumber(number))
+        there = assemble_at_mode(found, ModeNumber(number))
     except PoseReachFailure:
         there = None
     told = "the present pose" if mode.goal else describe_assembly(mode, found.setup.limits_ignored)[0]
