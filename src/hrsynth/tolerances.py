@@ -84,10 +84,6 @@ NEAR_POSE_DIFFERENCE_TOL = 1e-4
 SOLUTION_DISTANCE_MAX = 1e7
 """Distance (characteristic lengths) beyond which a solution is at infinity, if the next one is ``RANK_GAP_MIN``
 nearer."""
-INDEPENDENT_RATES_MIN = 1e-6
-"""Least singular value of the unit rates of independent conditions at the goal."""
-FORM_PIVOT_MIN_FRACTION = 1e-11
-"""Relative pivot that counts in the rank of a matrix of multiples of conditions."""
 NUMBER_ROUNDING = 2.0**-48
 """Relative error of the numbers of conditions: some ten roundings."""
 CHAIN_ROUNDING = 16 * 2.0**-52

@@ -22,8 +22,12 @@ import numpy as np
 
 from ...geometry.ranks import decompose_matrix
 from ...geometry.vectors import Array, build_plane_axes, cross
-from ...tolerances import FORM_PIVOT_MIN_FRACTION, INDEPENDENT_RATES_MIN
 from .pose_conditions import OnPlane, PoseCondition
+
+FORM_PIVOT_MIN_FRACTION = 1e-11
+"""Relative pivot that counts in the rank of a matrix of multiples of conditions."""
+INDEPENDENT_RATES_MIN = 1e-6
+"""Least singular value of the unit rates of independent conditions at the goal."""
 
 INDEPENDENT_PLANES_SINE_MIN = 1e-3
 """Least sine between a plane's normal and the span of the other normals that determine the position."""
