@@ -3,6 +3,7 @@
 from . import catalog as catalog
 from .analysis.accuracy.accuracy import accuracy as accuracy
 from .analysis.advice import advise as advise
+from .analysis.aspects.aspects import aspects as aspects
 from .analysis.aspects.path import path as path
 from .analysis.branch.proof import branch as branch
 from .analysis.check import check as check
@@ -43,6 +44,7 @@ __all__ = [
     "__version__",
     "accuracy",
     "advise",
+    "aspects",
     "basins",
     "branch",
     "build",

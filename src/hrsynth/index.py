@@ -16,7 +16,7 @@ from .options import NEEDED, Option
 
 PACKAGE = Path(__file__).parent
 INDEX, STUB = PACKAGE / "index.json", PACKAGE / "__init__.pyi"
-MARK = "\n@analysis(\n"
+MARK = "\n@analysis("
 KINDS: dict[str, Any] = {"str": str, "int": int, "float": float, "bool": bool, "several": list[str]}
 HELPERS = {
     "analysis.result_cache": ("clear_cache",),

@@ -6,7 +6,7 @@ import pytest
 
 import hrsynth
 from analysis.modes.pods import pods
-from hrsynth.analysis.modes.branches import solve_all
+from hrsynth.analysis.modes.tip_systems import solve_all
 from hrsynth.description import list_robots, load
 from hrsynth.errors import TooLarge
 

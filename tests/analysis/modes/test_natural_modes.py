@@ -15,9 +15,9 @@ from analysis.modes.closings import closings
 from analysis.modes.test_planar_loops import LINKS, STEPHENSON, linkage
 from analysis.modes.test_sighted import ROBOTS as SEEN
 from hrsynth.analysis.measured import MeasuredRobot
-from hrsynth.analysis.modes.branches import Model
 from hrsynth.analysis.modes.modes import AssemblyModes
 from hrsynth.analysis.modes.natural_modes import NaturalPlatform, solve_natural
+from hrsynth.analysis.modes.tip_systems import Model
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.errors import ExternalSolverFailure, UnsupportedLocus
 from hrsynth.geometry.vectors import Array, compare_poses

@@ -9,10 +9,10 @@ import pytest
 
 from hrsynth.analysis.loci.tips import derive_tip_loci
 from hrsynth.analysis.measured import MeasuredRobot
-from hrsynth.analysis.modes.branches import solve_all
 from hrsynth.analysis.modes.condition_modes import build_posed_platforms, solve_posed
 from hrsynth.analysis.modes.mode_search import search
 from hrsynth.analysis.modes.modes import modes
+from hrsynth.analysis.modes.tip_systems import solve_all
 from hrsynth.analysis.pose_requests import observe
 from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.geometry import build_mechanism

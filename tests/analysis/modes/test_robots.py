@@ -13,11 +13,11 @@ from analysis.modes.closings import asked, bodies_of, compared, distance, motor_
 from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.modes.assembly_mode import AssemblyMode
-from hrsynth.analysis.modes.branches import MODES_TIME_LIMIT_S, Model
 from hrsynth.analysis.modes.condition_modes import solve_posed
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.analysis.modes.natural_modes import solve_natural
 from hrsynth.analysis.modes.tip_modes import drop_couplings, solve_tips
+from hrsynth.analysis.modes.tip_systems import MODES_TIME_LIMIT_S, Model
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.pose_requests import observe as watched
 from hrsynth.description import list_robots, load

@@ -7,7 +7,7 @@ import pytest
 
 from analysis.modes.laws import needs_msolve
 from hrsynth.analysis.loci.tips import derive_tip_loci
-from hrsynth.analysis.modes.branches import build_model
+from hrsynth.analysis.modes.tip_systems import build_model
 from hrsynth.analysis.observed import ObservedRobot, build_motor_model
 from hrsynth.constraints.pattern import recognise
 from hrsynth.description import list_robots, load

@@ -23,7 +23,7 @@ from ...tolerances import CLOSURE_RESIDUAL_TOL, RELATION_ANGLE_TOL
 from ..loci.observation_loci import list_behind, list_opposite, separate_sights
 from ..observed import ObservedRobot
 from ..singularity.condition_check import compute_smallest_value
-from .branches import Model
+from .tip_systems import Model
 
 
 class LegReachFailure(NamedTuple):

@@ -28,7 +28,7 @@ from ...tolerances import LOCUS_DISTANCE_TOL, MOVED_AXIS_LEVER_MAX, POINT_DISTAN
 from ..loci.leg_conditions import Branches, OriginAndUnit, list_leg_conditions, require_rigid_platform
 from ..loci.observation_loci import PlatformObservation, list_plane_conditions, separate_sights
 from ..measured import MeasuredRobot
-from .branches import LEG_SOLUTION_CHOICES_MAX, MODES_TIME_LIMIT_S, Model, unite_modes
+from .tip_systems import LEG_SOLUTION_CHOICES_MAX, MODES_TIME_LIMIT_S, Model, unite_modes
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,13 +37,13 @@ from ..observation_inputs import POINTS, CameraLike, LegsLike, Seed, SensorLike
 from ..observed import ObservedRobot, RobotLike
 from ..setup_records import LIMITS_IGNORED
 from .assembly_mode import AssemblyMode, ModeReader, build_mode
-from .branches import MODES_TIME_LIMIT_S, Model
 from .condition_modes import PosedPlatform, solve_posed
 from .formation_modes import list_formation_modes
 from .mode_search import FoundMode, has_unobserved_motion, search
 from .natural_modes import NaturalPlatform, prove_existence, solve_natural
 from .near_modes import NearMode, describe_poses_alike, find_near_modes, parse_measurement_bound
 from .tip_modes import drop_couplings, may_count_more, solve_tips
+from .tip_systems import MODES_TIME_LIMIT_S, Model
 
 WITHIN = {
     "formation": "configurations up to trivial motions",

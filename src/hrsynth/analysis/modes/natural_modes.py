@@ -27,7 +27,7 @@ from ...solving.quadric_solver import QuadricSolver, SolutionBox
 from ...solving.uniqueness import enclose_unique, evaluate_quadrics, is_excluded
 from ..measured import MeasuredRobot
 from .assembly_mode import AssemblyMode
-from .branches import MODES_TIME_LIMIT_S, Model
+from .tip_systems import MODES_TIME_LIMIT_S, Model
 
 NATURAL_TIME_S = 5.0
 """Estimated time of one list (s)."""

@@ -19,8 +19,8 @@ from ...solving.platform.solve import SystemModes
 from ..loci.observation_loci import derive_all_loci
 from ..measured import MeasuredRobot
 from ..observed import ObservedRobot
-from .branches import Model, solve_all
 from .condition_modes import PosedPlatform, bound_posed, solve_posed
+from .tip_systems import Model, solve_all
 
 
 def drop_couplings(

@@ -1,4 +1,4 @@
-"""From tips on curves to the systems whose solutions are the modes: one for each choice of the legs' branches."""
+"""From tips on curves to the systems whose solutions are the modes: one for each choice of the legs' solutions."""
 
 from __future__ import annotations
 
