@@ -286,7 +286,7 @@ NATURAL: dict[str, Callable[[], AssemblyModes]] = {
 def test_lists_are_certified_in_natural_coordinates(name: str):
     found = NATURAL[name]()
     told = hrsynth.verify(json.loads(json.dumps(hrsynth.certificate(found))), found.setup.robot)
-    assert told.startswith(f"{len(found.modes)} real pose{'s' * (len(found.modes) > 1)}, and no other within")
+    assert told.startswith(f"{len(found.modes)} real pose{'s' * (len(found.modes) > 1)}, and no other among ")
 
 
 @pytest.mark.slow
@@ -364,8 +364,8 @@ def test_command_line(tmp_path, capsys):
     assert f"The certificate is written to {path}." in capsys.readouterr().out
     assert run_command(["verify", str(path)]) == 0
     assert capsys.readouterr().out == (
-        "accepted: 2 real of 2 complex poses, and no other (more than needed fits); "
-        "the robot closes at 2 of the real ones, to 1e-9\n"
+        "accepted: 2 real of 2 complex poses, and no other among poses with the rotation of this one "
+        "(more than needed fits); the robot closes at 2 of the real ones, to 1e-9\n"
     )
     assert run_command(["verify", str(path), "--robot", "delta", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["accepted"] is True

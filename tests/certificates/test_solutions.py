@@ -26,6 +26,7 @@ from hrsynth.certificates.solution_records import build_record
 from hrsynth.errors import InvalidCertificate
 from hrsynth.kinematics.goal_error import drift
 from hrsynth.mechanism import Mechanism
+from hrsynth.mechanism.builder import Builder
 
 Record = dict[str, Any]
 
@@ -66,7 +67,8 @@ def test_lists_are_accepted(name: str):
     record, count = json.loads(certified(name)), ROBOTS[name][2]
     said = checker.verify(record)
     assert said.startswith(
-        f"{count} real pose{'s' * (count != 1)}, and no other within the bounds of the unknowns, to 1e-"
+        f"{count} real pose{'s' * (count != 1)}, and no other among those of its equations within the bounds of the "
+        "unknowns, to 1e-"
     )
 
 
@@ -225,6 +227,33 @@ def test_the_command_writes_one_that_is_tied_to_its_robot(tmp_path: Path):
     record = hrsynth.certificate(hrsynth.modes(tmp_path / "0.urdf", cone=0))
     (tmp_path / "c.json").write_text(json.dumps(record), encoding="utf-8")
     said = hrsynth.verify(tmp_path / "c.json", tmp_path / "0.urdf")
-    assert said.startswith("1 real pose, and no other within the bounds of the unknowns, to 1e-")
+    assert said.startswith(
+        "1 real pose, and no other among poses in the plane of motion within the bounds of the unknowns, to 1e-"
+    )
     with pytest.raises(InvalidCertificate, match="not for"):
         hrsynth.verify(record, tmp_path / "1.urdf")
+
+
+def test_a_proof_among_poses_that_keep_directions_says_so():
+    """A parallelogram's crossed form is beyond a list among poses with one rotation, and beyond its certificate."""
+    bar = build_four_bar("bar")
+    kept, whole = (hrsynth.modes(robot, real=True, cone=0) for robot in (bar, build_four_bar("rocker")))
+    assert (len(kept.modes), len(whole.modes)) == (1, 2)
+    record = hrsynth.certificate(kept)
+    assert "keep the directions" in hrsynth.verify(record, bar)
+    del record["within"]
+    record["sha256"] = checker.digest(record)
+    assert "among those of its equations" in hrsynth.verify(record)
+    with pytest.raises(InvalidCertificate, match="not for"):
+        hrsynth.verify(record, bar)
+
+
+def build_four_bar(platform: str) -> Mechanism:
+    """A parallelogram with a crank that is driven."""
+    b = Builder("four_bar")
+    for link, at in (("base", (0, 0, 0)), ("crank", (0, 0, 0)), ("bar", (0, 1, 0)), ("rocker", (2, 0, 0))):
+        b.link(link, at=at)
+    ends = [("base", "crank"), ("crank", "bar"), ("bar", "rocker"), ("rocker", "base")]
+    for k, ((first, second), at) in enumerate(zip(ends, [(0, 0, 0), (0, 1, 0), (2, 1, 0), (2, 0, 0)], strict=True)):
+        b.joint(f"j{k}", "R", first, second, at=at, axis=(0, 0, 1), motor=k == 0, loop=k == 3)
+    return b.build(platform=platform)

@@ -94,8 +94,9 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
 
     Examples
     --------
-    >>> hrsynth.verify(hrsynth.certificate(hrsynth.modes("3rrr_m1")))
-    '2 real poses, and no other within the bounds of the unknowns, to 1e-8; the equations hold at them to 1e-9'
+    >>> proved = hrsynth.verify(hrsynth.certificate(hrsynth.modes("3rrr_m1")))
+    >>> proved.partition(" within")[0]
+    '2 real poses, and no other among poses in the plane of motion'
     """
     if isinstance(source, Mapping):
         record, name, file = dict(source), "the certificate", None
@@ -133,12 +134,18 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
                 record, robot
             )
         except (BadRequest, NoCertificate, PoseReachFailure) as error:
-            raise InvalidCertificate(name, f"it is not for {robot.name}: {error}") from None
+            raise InvalidCertificate(name, _compare_names(record, robot, str(error))) from None
         except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
             raise InvalidCertificate(name, f"it does not name the legs and pose of its claim ({error!r})") from None
         if not _is_same_geometry(record, own):
-            raise InvalidCertificate(name, f"it is not for {robot.name}: other geometry, legs or pose")
+            raise InvalidCertificate(name, _compare_names(record, robot, "other geometry, legs or pose"))
     return f"{proved}{ranks.describe_ranks(record)}" if record["claim"] == "ranks" else proved
+
+
+def _compare_names(record: dict[str, Any], robot: Mechanism, reason: str) -> str:
+    """Return why a certificate is not for a robot: it names another one, or else a reason."""
+    known = str(record.get("robot"))
+    return f"it is not for {robot.name}" + (f": {reason}" if known == robot.name else f", but for {known}")
 
 
 def _within_limits(checker: Path, file: Path) -> str:

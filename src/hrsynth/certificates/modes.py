@@ -54,6 +54,7 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
         "kind": found.kind,
         "at": found.pose.to_dict(),
         "observed": [[o.leg, o.link if o.is_segment_direction else o.leg] for o in found.setup.observed],
+        "within": found.within,
     }
     if found.found.complete and not found.found.solved and found.confined is not None:  # a copy: solved again
         found = modes(found.setup, at=found.goal, real=found.kind == "real", as_written=found.confined.as_written)
@@ -66,7 +67,7 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
         if found.found.complete and (natural := _list_again(found)) is not None:
             assert natural.model is not None
             assert isinstance(natural.model.system, NaturalPlatform)
-            return build_solutions_certificate(natural, natural.model.system, about)
+            return build_solutions_certificate(natural, natural.model.system, about | {"within": natural.within})
         raise NoCertificate(found.setup.robot.name, str(reason)) from None
 
 

@@ -389,7 +389,13 @@ def modes(record):
     more = " (more than needed fits)" * any(legs for _, legs in seen) + f" ({len(seen)} systems)" * (len(seen) > 1)
     more += f" nearer than 10^7 of its sizes ({apart} solutions are farther)" * (apart > 0)
     more += f"; the robot closes at {closed} of the real ones, to 1e-9" * ("assembly" in record)
-    return f"{real} real of {complex_} complex poses, and no other{more}"
+    return f"{real} real of {complex_} complex poses, and no other among {name_poses(record)}{more}"
+
+
+def name_poses(record):  # the poses of which these are all, as the writer names them: not checked
+    text = record.get("within", "those of its equations")
+    need(isinstance(text, str) and len(text) < 200 and text.isprintable(), "poses without a name")
+    return text
 
 
 def fair(system, tips):  # has its kind's keys; lengths in units of about its size (translation along planes: any)
@@ -489,7 +495,10 @@ def verify(record):  # what a certificate proves, in words; raises CertificateRe
     try:
         need(isinstance(record, dict) and record.get("format") == "hrsynth-certificate-1", "this is no certificate")
         need(record["sha256"] == digest(record), "the file was changed: its digest differs")
-        need(record["claim"] == "modes", "it is for another claim: verify_path.py and verify_ranks.py check those")
+        need(
+            record["claim"] == "modes",
+            "it is for another claim: verify_solutions.py, verify_path.py and verify_ranks.py check those",
+        )
         return modes(record)
     except Exception as error:
         raise (
@@ -507,4 +516,4 @@ def main(name):  # prints the answer
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[-1]))
+    sys.exit(main(sys.argv[1]) if len(sys.argv) == 2 else print("usage: python verify_certificate.py FILE") or 2)

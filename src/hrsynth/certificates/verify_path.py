@@ -294,7 +294,10 @@ def once(pairs: Any) -> Any:  # an object of JSON; of two keys a reader may see 
 def verify(record: Any) -> str:  # what a certificate proves, in words; raises PathRejection
     try:
         need(isinstance(record, dict) and record.get("format") == "hrsynth-certificate-1", "this is no certificate")
-        need(record["claim"] == "path", "it is not of a path: verify_certificate.py and verify_ranks.py check others")
+        need(
+            record["claim"] == "path",
+            "it is for another claim: verify_certificate.py, verify_solutions.py and verify_ranks.py check those",
+        )
         need(record["sha256"] == digest(record), "the file was changed: its digest differs")
         return path(record)
     except Exception as error:
@@ -316,4 +319,4 @@ def main(name: str) -> int:  # prints the answer
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[-1]))
+    sys.exit(main(sys.argv[1]) if len(sys.argv) == 2 else print("usage: python verify_path.py FILE") or 2)

@@ -69,7 +69,10 @@ def verify(record):  # what a certificate proves, in words; raises RankRejection
     try:
         need(isinstance(record, dict) and record.get("format") == "hrsynth-certificate-1", "this is no certificate")
         need(record["sha256"] == digest(record), "the file was changed: its digest differs")
-        need(record["claim"] == "ranks", "it is for another claim: verify_certificate.py, verify_path.py check those")
+        need(
+            record["claim"] == "ranks",
+            "it is for another claim: verify_certificate.py, verify_solutions.py and verify_path.py check those",
+        )
         return ranks(record)
     except Exception as error:
         raise error if isinstance(error, RankRejection) else RankRejection(f"no certificate: {error!r}") from None
@@ -85,4 +88,4 @@ def main(name):  # prints the answer
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[-1]))
+    sys.exit(main(sys.argv[1]) if len(sys.argv) == 2 else print("usage: python verify_ranks.py FILE") or 2)

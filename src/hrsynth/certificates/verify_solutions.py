@@ -394,9 +394,11 @@ def check_solutions(record):
         off = [sum(abs(c) * radius[k] for k, c in row) for row in rows]
         near = any(max(abs(a - p) + d for a, p, d in zip(at, pose, off, strict=True)) <= within for pose in poses)
         require(near or reject_box(equations, errors, middle, radius), "a box that is near no listed pose")
-    count = len(poses)
+    count, among = len(poses), record.get("within", "those of its equations")
+    require(isinstance(among, str) and len(among) < 200 and among.isprintable(), "poses without a name")
     return (
-        f"{count} real pose{'s' * (count != 1)}, and no other within the bounds of the unknowns, to 1e-{digits}; "
+        f"{count} real pose{'s' * (count != 1)}, and no other among {among} within the bounds of the unknowns, "
+        f"to 1e-{digits}; "
         f"the equations hold at {'it' if count == 1 else 'them'} to 1e-9"
     )
 
@@ -429,7 +431,10 @@ def verify(record):
     try:
         require(isinstance(record, dict) and record.get("format") == "hrsynth-certificate-1", "this is no certificate")
         require(record["sha256"] == digest(record), "the file was changed: its digest differs")
-        require(record["claim"] == "solutions", "it is for another claim")
+        require(
+            record["claim"] == "solutions",
+            "it is for another claim: verify_certificate.py, verify_path.py and verify_ranks.py check those",
+        )
         return check_solutions(record)
     except SolutionsRejection:
         raise
@@ -448,4 +453,4 @@ def main(name):
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[-1]))
+    sys.exit(main(sys.argv[1]) if len(sys.argv) == 2 else print("usage: python verify_solutions.py FILE") or 2)

@@ -191,14 +191,14 @@ def test_the_answer_says_what_was_proved(tmp_path: Path):
 )
 def test_ways_are_recorded_until_one_lists_all(name: str, ways: list[str]):
     listed = hrsynth.modes(name, real=True, cone=0)
-    assert [(way.way, way.outcome == "all modes") for way in listed.tried] == [(way, way == ways[-1]) for way in ways]
+    assert [(way.way, way.outcome == "all modes") for way in listed.ways] == [(way, way == ways[-1]) for way in ways]
     assert [way["way"] for way in json.loads(hrsynth.to_json(listed))["ways"]] == ways
 
 
 def test_a_search_is_the_last_way(tmp_path: Path):
     """Where time is short, each way says why it gives no list."""
     listed = hrsynth.modes(draw("schoenflies", 0, tmp_path), cone=0, time_limit=0.01)
-    assert [way.way for way in listed.tried][-2:] == [
+    assert [way.way for way in listed.ways][-2:] == [
         "natural coordinates, directions kept",
         "random starts of the whole robot",
     ]

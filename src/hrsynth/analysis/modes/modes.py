@@ -86,8 +86,8 @@ class FollowedMotion(NamedTuple):
 class TriedWay(NamedTuple):
     """A way to list the modes that was tried, and what came of it."""
 
-    way: str
-    outcome: str
+    way: Annotated[str, "loci of tips, conditions on the pose, natural coordinates, or random starts"]
+    outcome: Annotated[str, "what this way gave, or why it gave nothing"]
 
 
 class MeantLegs(NamedTuple):
@@ -118,6 +118,8 @@ class AssemblyModes(Result, shown_as="modes"):
         Poses within the measurement bound: found, not proved.
     self_motions
         Continuous families of modes, as far as they were followed.
+    ways
+        Ways to list the modes, in the order in which they were tried: the last one that gives a list is used.
     antipodal
         Solutions with the opposite value of an observation.
     """
@@ -135,7 +137,7 @@ class AssemblyModes(Result, shown_as="modes"):
     measurement_bound: Annotated[float, As("measurement_bound"), "error (rad) up to which near modes are sought"] = 0.0
     model: Model | None = None
     self_motions: tuple[SelfMotion, ...] = ()
-    tried: Annotated[tuple[TriedWay, ...], As("ways"), "ways to list the modes, in the order tried"] = ()
+    ways: Annotated[tuple[TriedWay, ...], As("ways"), "ways to list the modes, in the order tried"] = ()
     antipodal: tuple[AssemblyMode, ...] = ()
     """Solutions of the same equations with the opposite value of an observation."""
     formation: Annotated[Formation | None, Formation, OPTIONAL] = None
@@ -340,7 +342,7 @@ def modes(
         return _list_formation(setup, at, real)
     asked = None if at is None or isinstance(at, ClosedConfiguration) else parse_pose(at)
     if isinstance(asked, ModeNumber):
-        at, asked = assemble_at_mode(modes(setup), asked), None
+        at, asked = assemble_at_mode(modes(setup, real=real), asked), None
     elif isinstance(asked, JointPose):
         at, asked = follow_line(setup.all_samples.start, setup.motion, asked), None
     setup = setup if asked is None else setup.printing_like([asked])
@@ -353,7 +355,7 @@ def modes(
     tried = list[TriedWay]()
     listed = _list_modes(setup, measured, goal, wanted, real, as_written, time_limit, tried)
     near = find_near_modes(setup, goal, measured.observation_model, listed.modes, listed.candidates, bound)
-    return replace(listed, candidates=(), near_modes=near, measurement_bound=bound, tried=tuple(tried))
+    return replace(listed, candidates=(), near_modes=near, measurement_bound=bound, ways=tuple(tried))
 
 
 def _list_modes(
@@ -481,8 +483,8 @@ def assemble_at_mode(listed: AssemblyModes | None, asked: ModeNumber) -> ClosedC
     name, count = listed.setup.robot.name, len(listed.modes)
     if not 1 <= asked.number <= count:
         raise BadRequest(
-            f"{asked}: {name} has {count} modes at {listed.pose}",
-            remedy=f"Use mode:1 to mode:{count}."
+            f"{asked}: {name} has {count} mode{'s' * (count != 1)} at {listed.pose}",
+            remedy=f"Use mode:1{f' to mode:{count}' * (count > 1)}."
             if count
             else "Use another pose."
             if listed.found.continuous_family is None
@@ -583,8 +585,9 @@ def _list_by_system(
             reasons.append(error)
             tried.append(TriedWay(name, error.reason))
         else:
-            tried.append(TriedWay(name, answers[-1][1].outcome))
-            if answers[-1][1].complete and not may_count_more(answers[-1][0]):
+            outcome, more = answers[-1][1].outcome, may_count_more(answers[-1][0])
+            tried.append(TriedWay(name, f"{outcome}; another way may count more complex ones" if more else outcome))
+            if answers[-1][1].complete and not more:
                 break
     if not answers:
         raise reasons[0]

@@ -69,7 +69,7 @@ class NaturalPlatform(System):
     @property
     def motion(self) -> str:
         """Return the kind of poses among which modes are sought: ``planar``, ``kept`` or ``spatial``."""
-        return "planar" if is_planar(self.goal.model.mechanism) else "kept" if self.kept else "spatial"
+        return "kept" if self.kept else "planar" if is_planar(self.goal.model.mechanism) else "spatial"
 
     def place(self, link: str, x: Array) -> Array:
         """Return the pose (4, 4) of a link at x; of one with a single direction one of those with its image."""
@@ -159,6 +159,7 @@ def _read(measured: MeasuredRobot, goal: ClosedConfiguration, error: float, kept
     setup, model = measured.setup, measured.observation_model
     mechanism, name, point = goal.model.mechanism, setup.robot.name, setup.decomposition.point
     joints = {seen.joint for seen in model.observations if isinstance(seen, Encoder)}
+    joints |= {joint for coupling in mechanism.couplings for joint in (coupling.driver, coupling.driven)}
     links = {link for seen in model.observations for link in (seen.link, seen.seen_from or model.reference)}
     least = PLANAR_LEG_DOF_MIN if is_planar(mechanism) else LEG_DOF_MIN
     free_legs = [
