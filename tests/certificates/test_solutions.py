@@ -6,6 +6,7 @@ import copy
 import json
 import random
 from collections.abc import Callable
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
@@ -257,3 +258,23 @@ def build_four_bar(platform: str) -> Mechanism:
     for k, ((first, second), at) in enumerate(zip(ends, [(0, 0, 0), (0, 1, 0), (2, 1, 0), (2, 0, 0)], strict=True)):
         b.joint(f"j{k}", "R", first, second, at=at, axis=(0, 0, 1), motor=k == 0, loop=k == 3)
     return b.build(platform=platform)
+
+
+def test_equations_beside_those_of_a_robot_do_not_leave_a_pose_out():
+    """Moved by less than what is compared, two numbers leave the goal alone: its other pose is missing in the file."""
+    listed = hrsynth.modes("3rrr_m1", real=True, cone=0)
+    true = hrsynth.certificate(listed)
+    measured = MeasuredRobot.of(listed.setup, True)
+    system = solve_natural(measured, listed.goal, drift(listed.goal, None, listed.setup.normal.moved))[0].system
+    assert isinstance(system, NaturalPlatform)
+    x, matrices = np.append(1.0, system.view.goal), system.view.matrices.copy()
+    (p, q), M = np.argwhere(np.triu(matrices[56]) != 0)[:2], matrices[56]
+    a, b = x[p[0]] * x[p[1]], x[q[0]] * x[q[1]]
+    for (i, j), d in ((p, b), (q, -a)):
+        M[i, j] += d / max(abs(a), abs(b)) * 5e-8
+        M[j, i] = M[i, j]
+    view = replace(system.view, matrices=matrices)
+    record = true | build_record(replace(system, view=view), [system.view.goal])
+    assert len(record["solutions"]) == 1 < len(true["solutions"])
+    with pytest.raises(InvalidCertificate, match="not for"):
+        hrsynth.verify(seal(record), "3rrr_m1")

@@ -22,7 +22,8 @@ from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.errors import ExternalSolverFailure, UnsupportedLocus
 from hrsynth.geometry.vectors import Array, compare_poses
 from hrsynth.kinematics.goal_error import drift
-from hrsynth.mechanism import Mechanism
+from hrsynth.mechanism import Coupling, Mechanism
+from hrsynth.mechanism.builder import Builder
 from hrsynth.solving.platform.solve import SystemModes
 from kinematics.robots import ROBOTS
 from strategies import planar, pods
@@ -203,3 +204,78 @@ def test_a_search_is_the_last_way(tmp_path: Path):
         "random starts of the whole robot",
     ]
     assert not listed.found.complete
+
+
+def build_planar(joints: dict[str, tuple[str, str, str, tuple[float, float]]], platform: str, motors: str) -> Mechanism:
+    """A mechanism of joints R and of slides along the normal (Z), the first that close no loop in its tree."""
+    b, known = Builder("planar"), {"base"}
+    b.link("base")
+    for name, (kind, first, second, at) in joints.items():
+        closes = second in known
+        if not closes:
+            b.link(second, at=(*at, 0))
+            known.add(second)
+        letter, axis = {"Z": ("P", (0, 0, 1)), "X": ("P", (1, 0, 0)), "Y": ("P", (0, 1, 0))}.get(
+            kind, (kind, (0, 0, 1))
+        )
+        b.joint(name, letter, first, second, at=(*at, 0), axis=axis, motor=name in motors, loop=closes)
+    return b.build(platform=platform)
+
+
+FIVE_BAR = {
+    "a": ("R", "base", "A1", (0.0, 0.0)),
+    "b": ("R", "A1", "A2", (0.0, 0.5)),
+    "c": ("R", "base", "B1", (1.0, 0.0)),
+    "d": ("R", "B1", "B2", (1.2, 0.6)),
+    "t": ("R", "A2", "plate", (0.5, 1.0)),
+    "s": ("R", "B2", "plate", (0.5, 1.0)),
+}
+
+
+def test_a_leg_that_ends_beside_a_point_leaves_the_modes_found():
+    """A third leg that restricts nothing ends on another link, which turns."""
+    more = {
+        "k": ("R", "base", "C1", (0.5, -0.3)),
+        "l": ("R", "C1", "C2", (0.45, 0.3)),
+        "n": ("R", "C2", "A2", (0.35, 0.7)),
+    }
+    plain, led = (hrsynth.modes(build_planar(j, "plate", "ac"), real=True, cone=0) for j in (FIVE_BAR, FIVE_BAR | more))
+    assert (len(plain.modes), plain.found.complete, len(led.modes), led.found.complete) == (2, True, 2, False)
+
+
+def test_a_list_with_a_parallelogram_says_that_it_is_not_crossed():
+    """Crossed, it leaves the platform's rotation to a joint behind it: such poses are no part of the list."""
+    robot = build_planar(
+        {
+            "x": ("X", "base", "p1", (0.3, 0.2)),
+            "y": ("Y", "p1", "p2", (0.3, 0.2)),
+            "z": ("Z", "p2", "plate", (0.3, 0.6)),
+            "v": ("Z", "base", "car", (0.1, 0.3)),
+            "b": ("R", "car", "s1", (0.1, 0.3)),
+            "c": ("R", "car", "s2", (0.45, 0.35)),
+            "d": ("R", "s1", "bar", (0.2, 0.75)),
+            "e": ("R", "s2", "bar", (0.55, 0.8)),
+            "f": ("R", "bar", "plate", (0.3, 0.6)),
+        },
+        "plate",
+        "xv",
+    )
+    listed = hrsynth.modes(robot, real=True, cone=0)
+    assert listed.found.complete
+    assert str(listed.within).endswith("parallelograms not crossed")
+    assert "parallelograms not crossed" in hrsynth.verify(hrsynth.certificate(listed), robot)
+    poses = [at.pose("plate") for at in closings(listed, 60)]
+    kept = [X for X in poses if np.abs(X - listed.goal.pose("plate"))[:3, :3].max() < SAME]
+    assert max(min(compare_poses(X, m.bodies["plate"], 1.0) for m in listed.modes if m.bodies) for X in kept) > 0.01
+
+
+def test_chains_of_gears_may_be_listed_at_turns_that_do_not_close():
+    """z_a² = z_e and z_e = z_x² allow half a turn of x beside the couplings: it is listed, and not assembled."""
+    joints = {name: FIVE_BAR[name] for name in "abcd"} | {
+        "s": ("R", "B2", "A2", (0.6, 1.1)),
+        "x": ("R", "base", "X", (2.0, 0.0)),
+    }
+    robot = build_planar(joints, "A2", "a")
+    robot = robot.changed(couplings=(Coupling("g", "a", "c", 2.0), Coupling("h", "c", "x", 0.5)))
+    listed = hrsynth.modes(robot, sensor="direction:A2/0,1,0", cone=0)
+    assert listed.modes[0].goal

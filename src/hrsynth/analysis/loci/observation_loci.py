@@ -138,6 +138,8 @@ def derive_all_loci(
     """Return the loci of tips of legs and observed points, all other measured values fixed; and the observations.
     Raises ``UnsupportedLocus``."""
     setup = measured.setup
+    if setup.decomposition.point is not None and len(list_leg_ends(setup.decomposition)) > 1:
+        raise UnsupportedLocus(setup.robot.name, "legs end on several links of a platform that is a point")
     rest, seen = separate_sights(setup.decomposition, measured.observation_model, goal)
     if not seen:
         return derive_tip_loci(setup.decomposition, rest, measured.generic_pattern, goal), ()
@@ -154,8 +156,11 @@ def derive_all_loci(
 def _build_unheld(measured: MeasuredRobot, goal: ClosedConfiguration) -> TipLoci:
     """Return a platform without a leg. Raises ``UnsupportedLocus`` if legs restrict its motion."""
     decomposition, dof = measured.setup.decomposition, measured.setup.dof
-    bodies, (motion, normal) = list_leg_ends(decomposition), measured.moving
-    if len(bodies) > 1 or dof != {"translations": dof, "planar": 3, "spatial": 6}[motion]:
+    bodies = list_leg_ends(decomposition)
+    if len(bodies) > 1:
+        raise UnsupportedLocus(decomposition.mechanism.name, "legs end on several links")
+    motion, normal = measured.moving
+    if dof != {"translations": dof, "planar": 3, "spatial": 6}[motion]:
         raise UnsupportedLocus(decomposition.mechanism.name, "its legs restrict how the platform moves")
     return TipLoci(goal, motion, (), bodies, normal)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Annotated, Literal, NamedTuple
 
@@ -178,8 +179,10 @@ class ModeReader:
         if antipodal:  # not a mode: the assembly of the robot is not computed
             assembly = Assembly(None, platform=self.assembler.platform(bodies))
         elif self.made.closing is not None:
-            at = self.made.closing(mode.q)
-            assembly = Assembly(at, (), tuple(list_joints_beyond(at.model, at.q)), held=True)
+            assembly = Assembly(None, platform=self.assembler.platform(bodies))
+            with suppress(LoopClosureFailure):  # whole turns at which couplings do not close
+                at = self.made.closing(mode.q)
+                assembly = Assembly(at, (), tuple(list_joints_beyond(at.model, at.q)), held=True)
         elif not at_goal or near or list_joints_beyond(self.goal.model, self.goal.q):
             assembly = self.assembler.at(bodies, held, 0.0 if near else self.doubt(mode))
         if (

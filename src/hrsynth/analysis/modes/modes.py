@@ -20,6 +20,8 @@ from ...kinematics.limits import list_joints_beyond
 from ...kinematics.self_motions import SelfMotion, self_motion
 from ...kinematics.tasks import Task
 from ...kinematics.velocity_relation import ObservationModel
+from ...mechanism.legs import LegDecomposition
+from ...mechanism.notation import Rods
 from ...mechanism.observation import Observation
 from ...mechanism.pose import JointPose, ModeNumber, Pose, PoseLike, parse_pose
 from ...options import option
@@ -160,9 +162,9 @@ class AssemblyModes(Result, shown_as="modes"):
         if isinstance(system, NaturalPlatform):
             reach = f", within {SLIDE_REACH_MAX:g} characteristic lengths" * system.is_reach_assumed
             return WITHIN[system.motion] + reach
-        if self.confined is not None:
-            return WITHIN[self.confined.motion]
-        return WITHIN[system.poses.motion if isinstance(system, PosedPlatform) else "spatial"]
+        motion = self.confined.motion if self.confined is not None else "spatial"
+        within = WITHIN[system.poses.motion if isinstance(system, PosedPlatform) else motion]
+        return within + ", parallelograms not crossed" * _has_inner_parallelogram(self.setup.decomposition)
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -240,6 +242,18 @@ class AssemblyModes(Result, shown_as="modes"):
             )
             for mode in modes
         ]
+
+
+def _has_inner_parallelogram(decomposition: LegDecomposition) -> bool:
+    """Return True if a leg has a loop before its end: crossed, it can leave the platform's rotation as it is. A pair of
+    rods that ends on the platform cannot."""
+    for leg in decomposition.legs:
+        path = [] if decomposition.is_free_body(leg) else [*decomposition.path(leg)]
+        if any(
+            len(edge.joints) > 1 and not (edge is path[-1] and isinstance(edge.word.items[0], Rods)) for edge in path
+        ):
+            return True
+    return False
 
 
 @analysis(

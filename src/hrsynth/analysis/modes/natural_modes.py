@@ -175,6 +175,8 @@ def _read(measured: MeasuredRobot, goal: ClosedConfiguration, error: float, kept
         raise UnsupportedLocus(name, "no link keeps a direction")
     view = read_natural_view(goal, model.observations, model.reference, left_out, directions, error)
     bodies = list_placing_links(setup.decomposition)
+    if point is not None and len(bodies) > 1:
+        raise UnsupportedLocus(name, "legs end on several links of a platform that is a point")
     for link in mechanism.links if mechanism.couplings else bodies:
         if link not in view.links or view.groups[view.links[link][0]][0].shape[1] < 2 - (point is not None):
             raise UnsupportedLocus(name, f"the joints do not place {link}")
