@@ -137,7 +137,7 @@ def test_every_extra_of_a_command_or_function_is_tried():
 
 CALLS = {
     "fast": lambda: compiled_pose(),
-    "solve": lambda: import_module("hrsynth.solving.platform.msolve").executable(),
+    "solve": lambda: import_module("hrsynth.solving.platform.msolve").find_executable(),
 }
 """What needs a package in Python alone, or where another way is left to the command."""
 

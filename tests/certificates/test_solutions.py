@@ -228,9 +228,7 @@ def test_the_command_writes_one_that_is_tied_to_its_robot(tmp_path: Path):
     record = hrsynth.certificate(hrsynth.modes(tmp_path / "0.urdf", cone=0))
     (tmp_path / "c.json").write_text(json.dumps(record), encoding="utf-8")
     said = hrsynth.verify(tmp_path / "c.json", tmp_path / "0.urdf")
-    assert said.startswith(
-        "1 real pose, and no other among poses in space within the bounds of the unknowns, to 1e-"
-    )
+    assert said.startswith("1 real pose, and no other among poses in space within the bounds of the unknowns, to 1e-")
     with pytest.raises(InvalidCertificate, match="not for"):
         hrsynth.verify(record, tmp_path / "1.urdf")
 
