@@ -136,7 +136,7 @@ def offset_u(offset: float) -> Chain:
     bodies = (
         ChainBody(None, np.zeros(3)),
         ChainBody(a, np.zeros(3), off),
-        ChainBody(b, off, 0.9 * d, (d,), watched=(d,)),
+        ChainBody(b, off, 0.9 * d, (d,), observed=(d,)),
     )
     return Chain(bodies, False, 1.0)
 

@@ -148,8 +148,8 @@ class _Rods:
         """Return the rods of the last part of a leg, if it is of such rods."""
         if not isinstance(edge.word.items[0], Rods) or len(edge.joints) < 4:
             return None
-        watched = {o.link for o in own if isinstance(o, Direction)}
-        number = next((k for k, link in enumerate(edge.inside) if link in watched), 0)
+        observed = {o.link for o in own if isinstance(o, Direction)}
+        number = next((k for k, link in enumerate(edge.inside) if link in observed), 0)
         ends = [
             [
                 carry_joint(decomposition.mechanism, decomposition.mechanism.joints[name], goal.pose)[0]
@@ -350,7 +350,7 @@ def reverse_chain(found: Chain, known: Known) -> tuple[Array, Chain]:
     last = max(k for k, Q in enumerate(known) if Q is not None)
     bodies = found.bodies[last:]
     if (
-        any(body.cranks or body.watched or body.angles for body in bodies[1:])
+        any(body.cranks or body.observed or body.angles for body in bodies[1:])
         or len(bodies) < 2
         or any(body.slides or body.cranks for body in found.bodies[: last + 1])
     ):
@@ -374,7 +374,7 @@ def _read_in_plane(leg: str, found: Chain, count: int, tip: Array, middle: Origi
     bodies = found.bodies
     if (
         count != 1
-        or any(body.watched or body.angles or body.cranks for body in bodies)
+        or any(body.observed or body.angles or body.cranks for body in bodies)
         or bodies[0].slides
         or any(body.axis is None for body in bodies[1:])
     ):

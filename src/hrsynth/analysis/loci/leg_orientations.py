@@ -41,9 +41,9 @@ def list_orientations(chain: Chain) -> list[tuple[Known, float]]:
 def _resolve(chain: Chain, known: Known, gain: float) -> list[tuple[Known, float]]:
     for step in (
         _orient_driven,
-        _orient_watched_once,
+        _orient_observed_once,
         _orient_between_two,
-        _orient_watched_twice,
+        _orient_observed_twice,
         _orient_between_three,
     ):
         for solved in step(chain, known):
@@ -104,9 +104,9 @@ def _list_held_directions(chain: Chain, known: Known) -> Iterator[tuple[Array, l
     for k, body in enumerate(chain.bodies):
         for Q, way in list_ways(chain, known, k):
             if way:
-                yield from ((Q, group_axes(way), d) for d in body.watched)
+                yield from ((Q, group_axes(way), d) for d in body.observed)
             for crank in body.cranks:
-                yield from ((Q, group_axes([*way, (-1, crank.axis)]), d) for d in crank.watched)
+                yield from ((Q, group_axes([*way, (-1, crank.axis)]), d) for d in crank.observed)
 
 
 def find_kept_angle(chain: Chain) -> tuple[Array, Array]:
@@ -147,9 +147,9 @@ def _find_turning(chain: Chain, known: Known) -> tuple[Array, list[Way]]:
         if Q is not None:
             base = Q
             break
-        if body.axis is None and not body.watched:
+        if body.axis is None and not body.observed:
             raise LocusDerivationFailure("its end rotates freely")
-        axes.append(body.watched[0] if body.axis is None else body.axis)
+        axes.append(body.observed[0] if body.axis is None else body.axis)
         if body.axis is None:
             break
     return base, group_axes([(0, axis) for axis in axes[::-1]])
@@ -163,7 +163,7 @@ def _orient_driven(chain: Chain, known: Known) -> Iterator[_Found]:
             yield _Found((k,), tuple(((Q @ rotate_about_axis(axis, angle),), gain) for angle, gain in body.angles))
 
 
-def _orient_watched_once(chain: Chain, known: Known) -> Iterator[_Found]:
+def _orient_observed_once(chain: Chain, known: Known) -> Iterator[_Found]:
     """A direction held behind one axis keeps all bodies up to it from turning, where it is not along that axis."""
     for Q, parts, d in _list_held_directions(chain, known):
         if len(parts) == 1 and not lines.is_parallel(parts[0][0][1], d):
@@ -175,7 +175,7 @@ def _orient_watched_once(chain: Chain, known: Known) -> Iterator[_Found]:
                 yield _Found((place,), (((Q @ turn[0],), turn[1]),))
 
 
-def _orient_watched_twice(chain: Chain, known: Known) -> Iterator[_Found]:
+def _orient_observed_twice(chain: Chain, known: Known) -> Iterator[_Found]:
     """A direction held behind two axes: two solutions."""
     for Q, parts, d in _list_held_directions(chain, known):
         if len(parts) == 2:

@@ -131,7 +131,7 @@ def place(chain: Chain, known: Known) -> tuple[Reach | Quadrics, float]:
         alone = [(R, parts[0][0][1]) for R, way in list_ways(chain, known, k) if len(parts := group_axes(way)) == 1]
         if alone:
             _add_turning(total, body, *alone[0])
-        elif body.watched:
+        elif body.observed:
             _add_spinning(total, body)
         elif not body.is_rigid:
             raise LocusDerivationFailure("a link that rotates freely and carries a P or a parallelogram")
@@ -149,12 +149,12 @@ def _add_fixed(total: _Sum, body: ChainBody, Q: Array) -> None:
         if crank.held:
             total.centre = total.centre + Q @ crank.vector
         else:
-            _add_crank(total, Q, Q @ crank.axis, crank.vector, crank.watched)
+            _add_crank(total, Q, Q @ crank.axis, crank.vector, crank.observed)
 
 
-def _add_crank(total: _Sum, Q: Array, axis: Array, vector: Array, watched: Sequence[Array]) -> None:
+def _add_crank(total: _Sum, Q: Array, axis: Array, vector: Array, observed: Sequence[Array]) -> None:
     """A crank that turns about a fixed direction, from the orientation Q of what carries it."""
-    for d in watched:
+    for d in observed:
         if not lines.is_parallel(axis, d):
             start, end = Q @ d, d
             angle = np.arctan2(axis @ np.cross(start, end), start @ end - (axis @ start) * (axis @ end))
@@ -188,12 +188,12 @@ def _add_turning(total: _Sum, body: ChainBody, Q: Array, a: Array) -> None:
     for crank in body.cranks:
         if crank.held or not lines.is_parallel(crank.axis, a):
             raise LocusDerivationFailure("a parallelogram that rotates about another axis than its own")
-        _add_crank(total, Q, axis, crank.vector, crank.watched)
+        _add_crank(total, Q, axis, crank.vector, crank.observed)
 
 
 def _add_spinning(total: _Sum, body: ChainBody) -> None:
     """A body with a direction held that turns about it."""
-    d = body.watched[0]
+    d = body.observed[0]
     total.turn(d, body.shift)
     if body.cranks or any(not lines.is_parallel(slide, d) for slide in body.slides):
         raise LocusDerivationFailure(

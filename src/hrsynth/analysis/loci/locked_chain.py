@@ -39,7 +39,7 @@ class Crank:
 
     axis: Array
     vector: Array
-    watched: tuple[Array, ...] = ()
+    observed: tuple[Array, ...] = ()
     held: bool = False
 
 
@@ -48,7 +48,7 @@ class ChainBody:
     """A body that turns against the one before about ``axis`` (None: about all, in a ball; the base: not at all).
 
     ``point`` is on that axis; ``shift`` leads from there to the next body's, cranks left out; ``slides`` are directions
-    fixed in it along which it carries the next part; ``watched`` those that are fixed.
+    fixed in it along which it carries the next part; ``observed`` those that are fixed.
     """
 
     axis: Array | None
@@ -56,7 +56,7 @@ class ChainBody:
     shift: Array = field(default_factory=lambda: np.zeros(3))
     slides: tuple[Array, ...] = ()
     cranks: tuple[Crank, ...] = ()
-    watched: tuple[Array, ...] = ()
+    observed: tuple[Array, ...] = ()
     angles: tuple[tuple[float, float], ...] = ()
     """The angles about the axis that a drive leaves to it, each with what it makes of an error; none if it is free."""
 
@@ -119,8 +119,8 @@ def _measure_parallel_angles(bodies: Sequence[ChainBody]) -> float:
         for d in (
             *([] if body.axis is None else [body.axis]),
             *body.slides,
-            *body.watched,
-            *(d for crank in body.cranks for d in (crank.axis, *crank.watched)),
+            *body.observed,
+            *(d for crank in body.cranks for d in (crank.axis, *crank.observed)),
         )
     ]
     angles = [float(np.linalg.norm(cross(a, b))) for a, b in combinations(directions, 2) if lines.is_parallel(a, b)]
@@ -133,8 +133,8 @@ class _Walk:
     def __init__(
         self, decomposition: LegDecomposition, leg: Leg, held: Sequence[Observation], goal: ClosedConfiguration
     ) -> None:
-        self.anatomy, self.leg, self.goal = decomposition, leg, goal
-        self.watched: dict[str, list[Array]] = {}
+        self.decomposition, self.leg, self.goal = decomposition, leg, goal
+        self.observed: dict[str, list[Array]] = {}
         self.coordinates: dict[str, int] = {}
         """Return the number of coordinates of a joint that a motor fixes."""
         base = decomposition.mechanism.base
@@ -145,7 +145,7 @@ class _Walk:
                 isinstance(observation, Direction)
                 and (observation.seen_from or decomposition.mechanism.reference) == base
             ):
-                self.watched.setdefault(observation.link, []).append(
+                self.observed.setdefault(observation.link, []).append(
                     goal.pose(observation.link)[:3, :3] @ observation.direction
                 )
             else:
@@ -154,30 +154,30 @@ class _Walk:
     def bodies(self, tip: Array) -> tuple[tuple[ChainBody, ...], float]:
         """The bodies, shifts included, and how far their points were moved to meet (m); every measurement must be met
         on the way."""
-        at = self.anatomy.mechanism.base
-        bodies = [ChainBody(None, np.zeros(3), watched=self._sight(at))]
-        path = self.anatomy.path(self.leg)
+        at = self.decomposition.mechanism.base
+        bodies = [ChainBody(None, np.zeros(3), observed=self._sight(at))]
+        path = self.decomposition.path(self.leg)
         self.beside = set(self.leg.joints).difference(*(edge.joints for edge in path))
         for edge in path:
             end = edge.other(at)
             if len(edge.joints) == 1:
-                self._joint(bodies, self.anatomy.mechanism.joints[edge.joints[0]], at)
+                self._joint(bodies, self.decomposition.mechanism.joints[edge.joints[0]], at)
             elif isinstance(edge.word.items[0], Rods):
                 self._rods(bodies, edge, at)
             else:
                 self._parallelogram(bodies, edge, at)
-            bodies[-1] = replace(bodies[-1], watched=bodies[-1].watched + self._sight(end))
+            bodies[-1] = replace(bodies[-1], observed=bodies[-1].observed + self._sight(end))
             at = end
-        for what in (*self.watched, *self.coordinates):
+        for what in (*self.observed, *self.coordinates):
             raise LocusDerivationFailure(f"the observation at {what} is not on the path from the base to the leg's end")
         return _shift_bodies(bodies, tip, POINT_DISTANCE_TOL * self.goal.model.length)
 
     def _sight(self, link: str) -> tuple[Array, ...]:
-        return tuple(self.watched.pop(link, ()))
+        return tuple(self.observed.pop(link, ()))
 
     def _geometry(self, joint: Joint, at: str) -> tuple[Array, list[Array]]:
         """Centre (m) and axes of a joint, in the order in which they are met from the link ``at``."""
-        point, axes = carry_joint(self.anatomy.mechanism, joint, self.goal.pose)
+        point, axes = carry_joint(self.decomposition.mechanism, joint, self.goal.pose)
         return point, axes if joint.predecessor == at else axes[::-1]
 
     def _joint(self, found: list[ChainBody], joint: Joint, at: str) -> None:
@@ -204,6 +204,7 @@ class _Walk:
         length)."""
         near, far = self._links_fixed_to(at), self._links_fixed_to(joint.other(at))
         o, (a, *_) = self._geometry(joint, at)
+        joints = self.decomposition.mechanism.joints
         for link in self.leg.links:
             rod = self._links_fixed_to(link)
             ends = [self._centre(rod, end) for end in (near, far)]
@@ -213,7 +214,7 @@ class _Walk:
             least = min(np.linalg.norm(c), np.linalg.norm(d)) / self.goal.model.length
             if least > POINT_DISTANCE_TOL:
                 for name in [name for name in self.coordinates if name in self.beside]:
-                    if any(part.issuperset(self.anatomy.mechanism.joints[name].links) for part in (rod, near, far)):
+                    if any(part.issuperset(joints[name].links) for part in (rod, near, far)):
                         del self.coordinates[name]
                 return (0.0, 1.0), (2 * float(np.arctan2(a @ cross(d, c), d @ c)), 3.0 + 8.0 / float(least))
         return ()
@@ -222,7 +223,7 @@ class _Walk:
         """The centre (m) of a joint beside the way that joins two groups of links and is fixed in both, or None."""
         kinds = (JointType.REVOLUTE, JointType.UNIVERSAL, JointType.SPHERICAL)
         for name in sorted(self.beside):
-            joint = self.anatomy.mechanism.joints[name]
+            joint = self.decomposition.mechanism.joints[name]
             a, b = joint.links
             if joint.type in kinds and ((a in one and b in other) or (b in one and a in other)):
                 return self._geometry(joint, a)[0]
@@ -230,7 +231,7 @@ class _Walk:
 
     def _links_fixed_to(self, link: str) -> set[str]:
         """A link with those that held joints beside the way fix to it."""
-        mechanism, links, new = self.anatomy.mechanism, {link}, [link]
+        mechanism, links, new = self.decomposition.mechanism, {link}, [link]
         while new:
             at = new.pop()
             for joint in mechanism.joints_of(at):
@@ -242,24 +243,24 @@ class _Walk:
 
     def _parallelogram(self, found: list[ChainBody], edge: WordEdge, at: str) -> None:
         """Both cranks are one: they stay parallel (a parallelogram is not crossed)."""
-        joints = [self.anatomy.mechanism.joints[name] for name in edge.joints]
+        joints = [self.decomposition.mechanism.joints[name] for name in edge.joints]
         near, far = joints[:2] if edge.tail == at else joints[1::-1]
         (start, axes), (end, _) = self._geometry(near, at), self._geometry(far, at)
         held = any([self.coordinates.pop(joint.name, 0) for joint in joints])
         axis, way = axes[0], end - start
-        watched = tuple(d for link in edge.inside for d in self._sight(link))
-        crank = Crank(axis, way - axis * float(axis @ way), watched, held)
+        observed = tuple(d for link in edge.inside for d in self._sight(link))
+        crank = Crank(axis, way - axis * float(axis @ way), observed, held)
         found[-1] = replace(found[-1], cranks=(*found[-1].cranks, crank))
 
     def _rods(self, found: list[ChainBody], edge: WordEdge, at: str) -> None:
         """Add the observed one of parallel rods, or the first: all have one direction."""
         if any(name in self.coordinates for name in edge.joints):
             raise LocusDerivationFailure("a motor fixes a rod")
-        number = next((k for k, link in enumerate(edge.inside) if link in self.watched), 0)
-        joints = [self.anatomy.mechanism.joints[name] for name in edge.joints[2 * number : 2 * number + 2]]
+        number = next((k for k, link in enumerate(edge.inside) if link in self.observed), 0)
+        joints = [self.decomposition.mechanism.joints[name] for name in edge.joints[2 * number : 2 * number + 2]]
         near, far = joints if edge.tail == at else joints[::-1]
-        watched = tuple(d for link in edge.inside for d in self._sight(link))
-        found.append(ChainBody(None, self._geometry(near, at)[0], watched=watched))
+        observed = tuple(d for link in edge.inside for d in self._sight(link))
+        found.append(ChainBody(None, self._geometry(near, at)[0], observed=observed))
         found.append(ChainBody(None, self._geometry(far, at)[0]))
 
 
