@@ -17,6 +17,7 @@ import pytest
 
 import hrsynth
 from adversary.kinds import KINDS
+from analysis.modes import gears
 from analysis.modes.ankles import ankle
 from families.test_linkages import LISTED, drawn
 from hrsynth.analysis.measured import MeasuredRobot
@@ -27,7 +28,6 @@ from hrsynth.certificates.solution_records import build_record
 from hrsynth.errors import InvalidCertificate
 from hrsynth.kinematics.goal_error import drift
 from hrsynth.mechanism import Mechanism
-from hrsynth.mechanism.builder import Builder
 
 Record = dict[str, Any]
 
@@ -235,8 +235,10 @@ def test_the_command_writes_one_that_is_tied_to_its_robot(tmp_path: Path):
 
 def test_a_proof_among_poses_that_keep_directions_says_so():
     """A parallelogram's crossed form is beyond a list among poses with one rotation, and beyond its certificate."""
-    bar = build_four_bar("bar")
-    kept, whole = (hrsynth.modes(robot, real=True, cone=0) for robot in (bar, build_four_bar("rocker")))
+    corners = [(0, 0), (0, 1), (2, 1), (2, 0)]
+    links = {"base": (0, 3), "crank": (0, 1), "bar": (1, 2), "rocker": (2, 3)}
+    bar, rocker = (gears.linkage(corners, links, platform, "j0") for platform in ("bar", "rocker"))
+    kept, whole = (hrsynth.modes(robot, real=True, cone=0) for robot in (bar, rocker))
     assert (len(kept.modes), len(whole.modes)) == (1, 2)
     record = hrsynth.certificate(kept)
     assert "keep the directions" in hrsynth.verify(record, bar)
@@ -245,17 +247,6 @@ def test_a_proof_among_poses_that_keep_directions_says_so():
     assert "among those of its equations" in hrsynth.verify(record)
     with pytest.raises(InvalidCertificate, match="not for"):
         hrsynth.verify(record, bar)
-
-
-def build_four_bar(platform: str) -> Mechanism:
-    """A parallelogram with a crank that is driven."""
-    b = Builder("four_bar")
-    for link, at in (("base", (0, 0, 0)), ("crank", (0, 0, 0)), ("bar", (0, 1, 0)), ("rocker", (2, 0, 0))):
-        b.link(link, at=at)
-    ends = [("base", "crank"), ("crank", "bar"), ("bar", "rocker"), ("rocker", "base")]
-    for k, ((first, second), at) in enumerate(zip(ends, [(0, 0, 0), (0, 1, 0), (2, 1, 0), (2, 0, 0)], strict=True)):
-        b.joint(f"j{k}", "R", first, second, at=at, axis=(0, 0, 1), motor=k == 0, loop=k == 3)
-    return b.build(platform=platform)
 
 
 def test_equations_beside_those_of_a_robot_do_not_leave_a_pose_out():

@@ -163,10 +163,7 @@ def _system(proposed: ProposedRecord, robot: ClosedRobot | None) -> dict[str, An
             if robot is not None and at is not None:
                 box["links"] = robot.links(at)
                 if "places" not in record:
-                    tips = [
-                        [value(p, middle)[0] / value(w, middle)[0] for p in N]
-                        for N, _, w in points[: len(record["tips"])]
-                    ]
+                    tips = [[value(p, middle)[0] / value(w, middle)[0] for p in N] for N, _, w in points]
                     record["places"] = robot.places(
                         record.get("bodies", [0] * len(tips)),
                         frame,

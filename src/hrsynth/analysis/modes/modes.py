@@ -580,21 +580,20 @@ def _list_by_system(
     answers = list[tuple[Model, SystemModes]]()
     exact = drift(goal, wanted, setup.normal.moved)
     free = drop_couplings(measured, goal)
-    ways: dict[str, Callable[..., tuple[Model, SystemModes]]] = {
-        "natural coordinates": partial(solve_natural, time_limit=time_limit),
+    by_legs: dict[str, Callable[..., tuple[Model, SystemModes]]] = {
         "loci of tips": partial(solve_tips, as_written=as_written, time_limit=time_limit),
         "conditions on the pose": partial(solve_posed, time_limit=time_limit),
-        "natural coordinates, directions kept": partial(solve_natural, time_limit=time_limit, keeps=True),
     }
-    names = [*ways]
-    for name in names if free else [*names[1:3], names[0], *names[3:]]:
-        if name.endswith("kept") and any(answer[1].complete for answer in answers):
+    whole = {"natural coordinates": partial(solve_natural, time_limit=time_limit)}
+    narrower = {"natural coordinates, directions kept": partial(solve_natural, time_limit=time_limit, keeps=True)}
+    for name, way in ((whole | by_legs if free else by_legs | whole) | narrower).items():
+        if name in narrower and any(answer[1].complete for answer in answers):
             break
-        is_whole = name.startswith("natural")
+        is_whole = name not in by_legs
         try:
             if not is_whole and not setup.decomposition.is_platform_decided:
                 raise UnsupportedLocus(setup.robot.name, "joints inside its platform allow several poses of it")
-            answers.append(ways[name](*(free if free and not is_whole else (measured, goal)), exact))
+            answers.append(way(*(free if free and not is_whole else (measured, goal)), exact))
         except (UnsupportedLocus, ExternalSolverFailure, TooLarge, MissingExtra) as error:
             reasons.append(error)
             tried.append(TriedWay(name, error.reason))
